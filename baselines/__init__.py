@@ -1,7 +1,7 @@
 """Baselines of ikgym: solvers of inverse kinematics as policies, their evaluation, and references.
 
 >>> import baselines
->>> policy = baselines.make("dls", "varga7-fast")
+>>> policy = baselines.make("qp", "varga7-fast")
 
 `baselines.evaluate.evaluate` and `baselines.track` are imported when they are first used.
 """

@@ -37,6 +37,7 @@ _import_paths: dict[str, str] = {
     "truncated_svd": f"{_SOLVERS}.resolved_rate.truncated_svd:TruncatedSVD",
     "gram_schmidt": f"{_SOLVERS}.resolved_rate.gram_schmidt:GramSchmidt",
     "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
+    "qp_path": f"{_SOLVERS}.quadratic_program.path_following:PathFollowing",
     "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
     "offset_free": f"{_SOLVERS}.adaptive.offset_free:OffsetFree",

@@ -177,6 +177,11 @@ class NamedWrapper(Wrapper, abc.ABC):
         """See :attr:`SolverPolicy.commands`."""
         return self.inner.commands
 
+    @property
+    def free_timing(self) -> bool:
+        """See :attr:`SolverPolicy.free_timing`."""
+        return self.inner.free_timing
+
 
 def policies_in(spec: PolicySpec) -> Iterator[type[SolverPolicy]]:
     """The classes of all policies that a spec names: its own, and those of inner policies.

@@ -1,4 +1,4 @@
-"""Measures tables of `docs/results` anew: ``python -m docs.measure pose cost_time agents_interval``.
+"""Measures tables of `docs/results` anew: ``python -m docs.measure pose cost_time periods agents_interval``.
 
 A table says by its lines what is played: scenario, policy, episodes and seeds. To add a policy, add a line with these
 columns; --new measures those alone, without times, and --times the times alone. Each policy is timed in two episodes,
@@ -56,7 +56,7 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, skew, agents_interval."""
+    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -160,6 +160,27 @@ def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]
     return out
 
 
+def periods(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
+    """Cost and times of policies on the same motions at longer control periods, measured as a whole.
+
+    Raises:
+        SystemExit: A part alone is asked for.
+    """
+    if only_new or only_times:
+        raise SystemExit("periods: costs are relative to the lowest in the table, which is measured as a whole.")
+    old, usual, out = from_csv((RESULTS / "periods.csv").read_text(encoding="utf-8")), ikgym.scenarios.get(SCENARIO), []
+    for period, some in itertools.groupby(old, lambda line: line["period_ms"]):
+        lines, dt = list(some), 1e-3 * float(period)
+        name = f"{SCENARIO} at {period} ms"
+        scenario = usual.replace(name=name, dt=dt, steps=round(usual.steps * usual.dt / dt))
+        played, episodes = [line["policy"] for line in lines], int(lines[0]["episodes"])
+        rows = evaluate(scenario, played, episodes=episodes, timed=TIMED, progress=True)
+        found = [{"period_ms": period, **record} for record in records(rows, played)]
+        best = front(found)
+        out += [record | {"front": "yes" if record in best else "no"} for record in found]
+    return out
+
+
 def _batch_time(scenario: ikgym.Scenario, policy: Any, seeds: Sequence[int]) -> float:
     """The mean time of an arm in [µs] where `predict` is called for all episodes at once."""
     envs: Any = gym.make_vec("RedundantIK-v0", num_envs=len(seeds), scenario=scenario, preview=policy.preview)
@@ -178,7 +199,7 @@ def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        make = intervals if name == "agents_interval" else functools.partial(measured, name)
+        make = {"agents_interval": intervals, "periods": periods}.get(name, functools.partial(measured, name))
         new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times

@@ -83,7 +83,7 @@ def test_a_page_that_says_something_else_is_noticed(tmp_path):
 
 def row(policy):
     """Cells of a solver in the table of the page: its marks, and numbers from the total cost on."""
-    words = re.search(rf"^{policy} .*$", TEXT, re.MULTILINE)[0].translate({ord(mark): None for mark in "†‡"}).split()
+    words = re.search(rf"^{policy} .*$", TEXT, re.MULTILINE)[0].translate({ord(mark): None for mark in "†§"}).split()
     keys = ("total", "tracking", "position", "orientation", "peak", "acceleration", "p50", "p99")
     return dict(zip(keys, map(float, words[1:9]), strict=True))
 

@@ -21,7 +21,7 @@ MOST_TIPS = 8
 
 
 @dataclasses.dataclass(frozen=True)
-class Arguments(RobotOptions, shell.Names):
+class Arguments(shell.Names, RobotOptions):
     """Arguments of the command line."""
 
 

@@ -94,7 +94,7 @@ Examples:
   {prog} --test-sets varga7-pose-random --policies rhc_gradient --out results/test
   {prog} --test-sets panda-camera --pairs --policies dls rhc told --out results/camera
   {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
-  {prog} --scenarios lab.toml --policies dls --out results/lab --export csv joint-trajectory
+  {prog} --scenarios lab.toml --policies qp --out results/lab --export csv joint-trajectory
   {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
 
 Files in the folder of --out, each replaced in one go, so that a run may be stopped at any time:

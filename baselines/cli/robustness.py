@@ -37,7 +37,7 @@ class Options:
 
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the results, the table and the map."""
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls", "rhc", "rhc_foresight", "told")
+    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp", "rhc", "rhc_foresight", "told")
     """Policies as those of evaluate."""
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.toml")] = imperfect.FIELD_NAME
     """Scenario whose plant has severity 1; of panda-field that is the worst one."""
@@ -65,7 +65,7 @@ Maps the cost ratio of policies over two severities of an imperfect plant: of un
 camera), and of the drives (lag, delay). Test sets of imperfect plants: ikgym leaderboard --test-sets panda-field …
 
 Examples:
-  {prog} --policies dls rhc told --out results/map
+  {prog} --policies qp rhc told --out results/map
   {prog} --scenario lab.toml --severities 0 0.5 1 2 --episodes 8 --out results/lab
 
 Files in DIR, besides those of evaluate:

@@ -29,7 +29,7 @@ class Options:
     """The file to write."""
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
     """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls",)
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
     """Policies that are shown side by side, as evaluate takes them."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Reset seed of the episode."""
@@ -54,7 +54,7 @@ Draws an episode as an H.264 video: the arm, the paths and the errors over time,
 Needs pip install "ikgym[video]".
 
 Examples:
-  {prog} --scenario panda-circle --policy dls --out circle.mp4
+  {prog} --scenario panda-circle --policy qp --out circle.mp4
   {prog} --scenario varga7-fast --policy dls rhc rhc_foresight --speed 0.2 --width 1280 --out talk.mp4"""
 
 

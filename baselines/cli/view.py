@@ -27,7 +27,7 @@ class Options:
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
     """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("dls",)
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
     """Policies side by side, as evaluate takes them."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Reset seed of the episode."""
@@ -53,9 +53,9 @@ drag, each with its own policy, without the imperfections of the scenario's plan
 limits. Needs pip install "ikgym[view]".
 
 Examples:
-  {prog} --scenario panda-circle --policy dls rhc
+  {prog} --scenario panda-circle --policy qp rhc
   {prog} --scenario varga7-random --seed 2000000 --policy mfac rhc_foresight
-  {prog} --scenario lab.toml --policy dls --urdf lab.urdf"""
+  {prog} --scenario lab.toml --policy qp --urdf lab.urdf"""
 
 
 def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:

@@ -17,6 +17,7 @@ import numpy as np
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
+from baselines.evaluation.free_timing import first_steps, path_scores
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits
@@ -83,6 +84,10 @@ class Row:
         noise_seed: Seed of the noise in sensors and drives; 0 is the noise of the reset seed.
         ideal: Fingerprint of the scenario with an ideal plant; its own if the plant is ideal.
         acceleration_stated: Whether each joint has an acceleration limit, or the arm has no limits at all.
+        path_time: With free timing, the time in [s] in which the end of the path was reached; None if it was not.
+        path_position_error: With free timing, the largest distance from the reference at the policy's own progress, in
+            [m], to the end of the path; None without.
+        path_orientation_error: Likewise, in [rad].
     """
 
     scenario: str
@@ -122,6 +127,9 @@ class Row:
     noise_seed: int = 0
     ideal: str | None = None
     acceleration_stated: bool = True
+    path_time: float | None = None
+    path_position_error: float | None = None
+    path_orientation_error: float | None = None
 
     @property
     def lost(self) -> bool:
@@ -188,6 +196,8 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
+    path = path_scores(scenario, seeds, episode)
+    episode = first_steps(episode, scenario.steps)
     total = float(add_up(episode.tracking_cost + episode.velocity_cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
@@ -237,6 +247,9 @@ def measure(
         noise_seed=seeds.noise_seed,
         ideal=ideal,
         acceleration_stated=bool(np.isfinite(scenario.arm.acceleration_limit).all()) or not scenario.arm.limited,
+        path_time=path and path.time,
+        path_position_error=path and path.position_error,
+        path_orientation_error=path and path.orientation_error,
     )
 
 

@@ -20,6 +20,7 @@ import ikgym
 from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
 from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
+from baselines.evaluation.free_timing import play_to_end
 from baselines.evaluation.jobs import Job
 from baselines.evaluation.metrics import Row, describe, measure
 from baselines.evaluation.policies import check_picklable
@@ -118,7 +119,7 @@ def play_episodes(
     timed: bool,
     tick: Tick | None = None,
 ) -> list[Episode]:
-    """Plays episodes of a policy, in the wrapped environment if it needs one.
+    """Plays episodes of a policy, in the wrapped environment if it needs one; with free timing, to the end of the path.
 
     Args:
         scenario: The scenario.
@@ -133,6 +134,8 @@ def play_episodes(
     """
     if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
         return [play_wrapped(scenario, policy, one, timed=timed, tick=tick) for one in seeds]
+    if getattr(policy, "free_timing", False):
+        return play_to_end(scenario, policy, seeds, preview, timed=timed, tick=tick)
     return rollouts(scenario, policy, seeds, preview=preview, timed=timed, tick=tick)
 
 

@@ -47,15 +47,20 @@ def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str,
         policies: The policies that were evaluated, as text; each is the label of its line. Others are called by their
             name and the parameters that are not at their defaults.
 
+    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
+    the largest distance from the reference at the policy's own progress, or on the clock of the others.
+
     Raises:
         InvalidInputError: The training seeds of an agent have played different episodes.
     """
     out: list[dict[str, Any]] = []
+    timing = any(row.path_position_error is not None for row in rows)
     for scenario in dict.fromkeys(row.scenario for row in rows):
         here = [row for row in rows if row.scenario == scenario]
         known = all(row.cost_ratio is not None for row in here)
         lowest = {} if known else _lowest(here)
-        found = [_record(label, some, lowest) for label, some in _by_label(here, policies).items()]
+        labelled = _by_label(here, policies).items()
+        found = [_record(label, some, lowest) | (_along_path(some) if timing else {}) for label, some in labelled]
         out += sorted(found, key=lambda one: one["cost_ratio"])
     return out
 
@@ -116,6 +121,11 @@ def _record(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> dic
         "time_p50_us": together.median("time_p50_us"),
         "time_p99_us": together.largest("time_p99_us"),
     }
+
+
+def _along_path(rows: Sequence[Row]) -> dict[str, float | None]:
+    errors = [row.position_error_max if row.path_position_error is None else row.path_position_error for row in rows]
+    return {"path_time_s": Summary(rows).path_time, "path_error_mm": 1e3 * max(errors)}
 
 
 def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> FloatArray:

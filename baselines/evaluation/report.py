@@ -24,11 +24,16 @@ Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
 OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
-STATED_NOTE = "‡ no acceleration limit stated for some joint: the peak is what was used"
+STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
+TIMING_NOTE = (
+    "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
+    "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
+)
 
 
 def _policy(summary: Summary) -> str:
-    return summary.label + " *" * summary.reference + " †" * bool(summary.total("steps_at_joint_limit"))
+    marks = " *" * summary.reference + " †" * bool(summary.total("steps_at_joint_limit")) + " ‡" * summary.free_timing
+    return summary.label + marks
 
 
 POLICY = Column("policy", "", _policy)
@@ -54,8 +59,8 @@ ERRORS = (
         "q̈ peak",
         "",
         lambda s: s.largest("qddot_peak"),
-        text=lambda s: number(s.largest("qddot_peak")) + " ‡" * (not s.first.acceleration_stated),
-        about="largest joint acceleration, in rad/s² or m/s²; ‡ no limit stated",
+        text=lambda s: number(s.largest("qddot_peak")) + " §" * (not s.first.acceleration_stated),
+        about="largest joint acceleration, in rad/s² or m/s²; § no limit stated",
         drop=3,
     ),
 )
@@ -63,6 +68,16 @@ TIMES = (
     Column("p50", "[µs]", lambda s: s.median("time_p50_us"), about="median time of a call after the first"),
     Column("p99", "[µs]", lambda s: s.largest("time_p99_us"), about="99th percentile of these times", drop=5),
     Column("misses", "", lambda s: s.total("deadline_misses"), about="such calls longer than Δt", drop=6),
+)
+PATH = (
+    Column("path time", "[s]", lambda s: s.path_time, about="when the end of the path was reached, with free timing"),
+    Column(
+        "path err",
+        "[mm]",
+        lambda s: s.largest("path_position_error"),
+        1e3,
+        about="largest distance from the reference at the policy's own progress, with free timing",
+    ),
 )
 LOST = Column("lost", "", lambda s: s.lost, about="episodes in which the arm was lost")
 EPISODES = Column("episodes", "", lambda s: s.episodes, about="number of episodes; more than one of a random scenario")
@@ -81,6 +96,7 @@ COLUMNS = (
     Column("tracking", "cost", lambda s: s.mean("tracking_cost"), drop=4),
     RATIO,
     *ERRORS,
+    *PATH,
     *TIMES,
     FOLLOWED,
     STATUS,
@@ -219,6 +235,7 @@ def remarks(rows: Sequence[Row]) -> list[str]:
     notes = [REFERENCE_NOTE] * any(is_reference(row.policy) for row in rows)
     notes += [STOP_NOTE] * any(row.steps_at_joint_limit for row in rows)
     notes += [STATED_NOTE] * (not all(row.acceleration_stated for row in rows))
+    notes += [TIMING_NOTE] * any(summary.free_timing for summary in summaries)
     ratio = "cost ratio: total cost / best known cost, – where none is known; "
     ratio *= any(row.cost_ratio is not None for row in rows)
     notes.append(f"{ratio}p50, p99: time of a call after the first; misses: such calls longer than Δt")

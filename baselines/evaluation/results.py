@@ -18,6 +18,7 @@ import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
+from baselines.evaluation.free_timing import as_long
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
 from baselines.files import (
@@ -137,7 +138,7 @@ class Results:
 
     def _write_motion(self, job: Job, row: Row, kind: Format, episode: Episode) -> None:
         try:
-            content = kind.content(job.scenario, job.seeds, episode, self._accelerations)
+            content = kind.content(as_long(job.scenario, episode), job.seeds, episode, self._accelerations)
         except InvalidInputError as error:
             reason = f"no {kind.suffix} of seed {row.seed}: {error}"
             self.not_exported.append(Skipped(row.scenario, row.policy, reason))

@@ -158,6 +158,16 @@ class Summary:
         return max((row.solver_status for row in self.rows), key=lambda status: Status[status.upper()])
 
     @property
+    def free_timing(self) -> bool:
+        """Whether the policy may be later than the reference."""
+        return self.first.path_position_error is not None
+
+    @property
+    def path_time(self) -> float | None:
+        """The longest time to the end of the path, in [s]; None if an episode did not reach it."""
+        return None if any(row.path_time is None for row in self.rows) else self.largest("path_time")
+
+    @property
     def reference(self) -> bool:
         """Whether the policy has privileged information."""
         return is_reference(self.first.policy)

@@ -128,13 +128,16 @@ def markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
 def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
     """A table as HTML, complete without scripts; the value of a line's checkbox is the number of its summary."""
     columns = filled(columns, summaries)
-    heads = [("policy", "* has privileged information"), ("scenario", "name of the scenario")]
+    heads = [("policy", "* has privileged information, ‡ free timing"), ("scenario", "name of the scenario")]
     heads += [(column.head, column.about) for column in columns]
     out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']
     out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
     out.append("</tr></thead><tbody>")
     for place, summary in enumerate(summaries):
-        name, scenario = escape(summary.label + " *" * summary.reference), escape(summary.first.scenario)
+        name, scenario = (
+            escape(summary.label + " *" * summary.reference + " ‡" * summary.free_timing),
+            escape(summary.first.scenario),
+        )
         out += [
             f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
             f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.free_timing import as_long
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
 from baselines.evaluation.motion.played import by_joint
 from baselines.evaluation.play import play_episodes
@@ -161,6 +162,7 @@ def track(
     bound, shown, one = bind(policy, found, seeds, preview, wrap)
     with threadpool_limits(limits=1):
         (episode,) = play_episodes(found, bound, [seeds], shown, timed=True)
+    found = as_long(found, episode)
     return _tracking(found, one.name, one.parameters(found, bound), seeds, episode)
 
 

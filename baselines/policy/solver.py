@@ -128,6 +128,11 @@ class SolverPolicy(Frozen, abc.ABC):
         """Number of its last commands that the policy must see."""
         return 0
 
+    @property
+    def free_timing(self) -> bool:
+        """Whether the policy may be later than the reference; its :meth:`diagnostics` have its ``progress`` then."""
+        return False
+
     def memory(self, rows: int) -> Memory:
         """The memory at the start of an episode, preferably a NamedTuple: :meth:`solve` is handed one of its type.
 

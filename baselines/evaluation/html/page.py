@@ -43,6 +43,7 @@ COLUMNS = (
             ("q̈ limit", "acceleration", "steps with a joint at its acceleration limit"),
         )
     ),
+    *report.PATH,
     *report.TIMES,
     report.EPISODES,
     report.LOST,

@@ -9,11 +9,11 @@ import numpy as np
 from ikgym.validation import FloatArray
 
 #: Accelerations of the spline may be so many times those of the motion.
-EXCESS = 1.09
+EXCESS = 1.095
 #: Accelerations below this share of the largest one of all joints count as so large.
 FLOOR = 1e-2
 #: Periods in which the spline catches up with a motion that begins with a jump of its velocity.
-CATCH_UP = 36
+CATCH_UP = 22
 
 
 class Points(NamedTuple):
@@ -31,11 +31,11 @@ class Points(NamedTuple):
 
 
 def smooth(q: FloatArray, dt: float) -> Points:
-    """Points between which a cubic Hermite spline accelerates at most 1.09 times as hard as the motion.
+    """Points between which a cubic Hermite spline accelerates at most 1.1 times as hard as the motion.
 
     The first of these that does: points through the coordinates themselves, which suit gradual accelerations; points of
     the cubic B-spline that has the coordinates as its control points, within q̈ Δt² / 6 of them; the same for a motion
-    whose velocity jumps at the start, caught up with from rest, within 6 q̈ Δt²; else, after a wait of one period.
+    whose velocity jumps at the start, caught up with from rest, within 4 q̈ Δt²; else, after a wait of one period.
 
     Args:
         q: Joint coordinates, one row a period, from rest; the last two are equal. Shape (k, n).
@@ -67,10 +67,15 @@ def accelerations(points: Points, dt: float) -> FloatArray:
 
 def _points(q: FloatArray, dt: float, *, smoothed: bool = False) -> Points:
     """Points with central differences, at the coordinates or where the B-spline is, from the first coordinates on."""
+    control = q
+    if smoothed:
+        fading = _fading(len(q))
+        control = q - np.outer(fading, (q[1] - q[0]) / (2.0 + fading[1]))
     # The motion is continued as its own mirror image before the start, and at rest after the end.
-    padded = np.vstack([q[1:2], q, q[-1:]])
+    padded = np.vstack([control[1:2], control, control[-1:]])
     bend = np.diff(padded, 2, axis=0)
-    moved = q + (bend - np.outer(_fading(len(q)), bend[0])) / 6.0 if smoothed else q
+    moved = control + bend / 6.0 if smoothed else q.copy()
+    moved[0] = q[0]
     return Points(moved, (padded[2:] - padded[:-2]) / (2.0 * dt), bend / dt**2)
 
 

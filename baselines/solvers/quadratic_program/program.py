@@ -10,9 +10,33 @@ from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.tasks import AXIS, POSE
 
 # Weight of the length of a task shift against its direction, and of joint motion against that.
 SCALING_WEIGHT = 1e-2
+# The error of a path that an arm rather takes on than stand still, and the motion in one step below which the path
+# itself stands still, in [m] or [rad].
+TAKEN_ON, STILL = 1e-5, 1e-9
+
+
+@inner
+def weigh_rotation(kind, weight, jacobian, motion, error):
+    """Multiplies the rows of rotation by their weight against those of position.
+
+    Args:
+        kind: The kind of task coordinates.
+        weight: In [m/rad].
+        jacobian: J. Shape (e, n).
+        motion: Motion of the reference. Shape (e,).
+        error: The present error. Shape (e,).
+    """
+    e = error.shape[0]
+    first, last = (3, e) if kind in (POSE, AXIS) else (0, e - 3)  # where there is no orientation: none
+    for a in range(first, last):
+        motion[a] *= weight
+        error[a] *= weight
+        for j in range(jacobian.shape[1]):
+            jacobian[a, j] *= weight
 
 
 @inner
@@ -117,6 +141,43 @@ def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     hessian[n, n] = 1.0 + SCALING_WEIGHT
     linear[n] = SCALING_WEIGHT * length
     return length
+
+
+@inner
+def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear):
+    """The same where the task shift is s Δx + e, with the motion Δx along a path and a speed s that is aimed at.
+
+    Args:
+        jacobian: J Δt. Shape (e, n).
+        motion: Δx. Shape (e,).
+        error: e. Shape (e,).
+        weight: Weight of the joint motion.
+        preferred: Preferred joint velocities. Shape (n,).
+        speed: The speed that is aimed at, from 0 to 1.
+        hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
+        linear: Receives g. Shape (n + 1,).
+
+    Returns:
+        ‖Δx‖, the variable being s ‖Δx‖; 0 where the path stands still.
+    """
+    e, n = jacobian.shape
+    goal(jacobian, error, weight, preferred, linear)
+    length = 0.0
+    for a in range(e):
+        length += motion[a] * motion[a]
+    length = math.sqrt(length)
+    still = length < STILL
+    for j in range(n):
+        along = 0.0
+        for a in range(e):
+            along += jacobian[a, j] * motion[a]
+        hessian[n, j] = hessian[j, n] = 0.0 if still else -along / length
+    weight_of_speed = max(SCALING_WEIGHT, 0.0 if still else TAKEN_ON / length)
+    hessian[n, n] = 1.0 + weight_of_speed
+    linear[n] = weight_of_speed * speed * length
+    for a in range(e):
+        linear[n] -= 0.0 if still else motion[a] * error[a] / length
+    return 0.0 if still else length
 
 
 @inner

@@ -61,7 +61,7 @@ def test_the_spline_accelerates_as_hard_as_the_motion_and_stays_with_it(q):
     fine = np.arange(0.0, DT * (len(q) - 1), 1e-4)
     late = DT * (len(points.q) - len(q))  # a wait of one period
     apart = np.abs(spline(fine + late)[:, 0] - np.interp(fine, DT * np.arange(len(q)), q[:, 0])).max()
-    assert apart <= 6.0 * hardest * DT**2
+    assert apart <= 4.0 * hardest * DT**2
     np.testing.assert_array_equal(points.q[[0, -1]], q[[0, -1]])
     assert not points.qdot[[0, -1]].any()
     assert not points.qddot[-1].any()

@@ -41,6 +41,11 @@ def states(scenario, rows, far, seed=0):
     return Batch(q, last, pose, nominal[:, None], np.ones((rows, 1))), NominalMemory(before, np.ones(rows, np.bool_))
 
 
+def rotation_rows(task, e):
+    """The components of an error that belong to the rotation."""
+    return {"position": slice(0, 0), "pose": slice(3, 6), "axis": slice(3, 5)}.get(task, slice(0, e - 3))
+
+
 def program(policy, batch, memory, i):
     """The least squares of the docstring, for row i, without braking: matrix, goal, bounds, J Δt and Δx."""
     problem, model = policy.problem, policy.problem.model
@@ -48,6 +53,9 @@ def program(policy, batch, memory, i):
     jacobian = problem.dt * problem.task.jacobian(rotation, geometric)
     error = policy.gain * problem.task.error(memory.nominal[i], batch.pose[i])
     shift = problem.task.error(batch.nominal[i, 0], memory.nominal[i]) + error
+    rotation = rotation_rows(problem.task.name, len(error))
+    for rows in (jacobian, error, shift):
+        rows[rotation] *= policy.rotation_weight
     rho = policy.damping * np.sum(jacobian**2) / model.joints
     rho += policy.lm_damping * (error @ error) / problem.largest_qdot.max() ** 2
     lower, upper = np.empty(model.joints), np.empty(model.joints)
@@ -90,6 +98,31 @@ def test_is_the_minimum_that_it_states(on, far):
         bound += ((ours == lower) | (ours == upper)).any()
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
     assert on in ("no limits", "matrix") or bound > 15
+
+
+@pytest.mark.parametrize("on", ["panda", "axis", "some limits", "matrix", "position"])
+def test_rotation_is_weighed_as_stated(on):
+    position = {"position": circle(task=ikgym.tasks.get("position"))}
+    scenario, apart = {**SCENARIOS, **position}[on], 0.0
+    policy = baselines.make("qp", scenario, rotation_weight=0.2, damping=1e-3, posture=0.3, braking_share=0.0)
+    batch, memory = states(scenario, 20, 3.0)
+    solution, equal = policy.solve(batch, memory), policy.replace(rotation_weight=1.0).solve(batch, memory)
+    for i in range(20):
+        matrix, goal, (lower, upper), *_ = program(policy, batch, memory, i)
+        fixed = 1e-13 * (lower == upper)
+        theirs = lsq_linear(matrix, goal, (lower - fixed, upper + fixed), **BVLS).x
+        np.testing.assert_allclose(solution.qdot[i], theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
+        apart = max(apart, np.abs(solution.qdot[i] - equal.qdot[i]).max())
+    assert apart == 0.0 if on == "position" else apart > 1e-3
+
+
+def test_the_less_rotation_weighs_the_nearer_is_the_position():
+    """On a path that leads out of reach, where position and rotation are at odds."""
+    scenario = beyond_reach()
+    far = [
+        played(scenario, baselines.make("qp", scenario, rotation_weight=weight))[0].max() for weight in (1.0, 0.1, 0.01)
+    ]
+    assert far[0] > 1.1 * far[1] > 1.1**2 * far[2]
 
 
 @pytest.mark.parametrize("on", ["panda", "tiago", "no limits"])

@@ -1,0 +1,123 @@
+"""Policies with free timing: their episodes go on to the end of the path, and are measured along it, too.
+
+Costs, errors and times of a row remain those of the scenario's own steps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts
+from ikgym.kernels.simulation import nominal_rows
+from ikgym.kernels.tasks import AXIS, POSE
+from ikgym.scenarios import Preview, Scenario
+from ikgym.validation import FloatArray
+
+#: How many times as long as the scenario an episode may become; the numbers before are tried first.
+LONGER = (1, 2, 4)
+
+
+class PathScores(NamedTuple):
+    """How a path was followed.
+
+    Attributes:
+        time: When its end was reached, in [s]; None if it was not.
+        position_error: Largest distance from the reference at the policy's own progress, in [m].
+        orientation_error: Likewise, in [rad]; None for tasks whose coordinates are no angles.
+    """
+
+    time: float | None
+    position_error: float
+    orientation_error: float | None
+
+
+def play_to_end(
+    scenario: Scenario,
+    policy: Policy,
+    seeds: Sequence[int | Seeds],
+    preview: Preview,
+    *,
+    timed: bool,
+    tick: Tick | None = None,
+) -> list[Episode]:
+    """Episodes that go on until the end of the path is reached, but at least for the steps of the scenario.
+
+    Args:
+        scenario: The scenario.
+        policy: A policy with free timing.
+        seeds: Seeds of the episodes.
+        preview: Steps ahead that the policy is shown.
+        timed: Whether the calls are timed.
+        tick: Reports progress; the steps of the scenario count.
+
+    Raises:
+        InvalidInputError: See :func:`rollouts`.
+    """
+    for factor in LONGER:
+        longer = scenario.replace(steps=factor * scenario.steps)
+        episodes = rollouts(longer, policy, seeds, preview=preview, timed=timed)
+        if all(_end(scenario, episode) is not None for episode in episodes):
+            break
+    if tick is not None:
+        tick(scenario.steps * len(seeds))
+    return [first_steps(episode, _end(scenario, episode) or len(episode.q)) for episode in episodes]
+
+
+def first_steps(episode: Episode, steps: int) -> Episode:
+    """The beginning of an episode."""
+    if len(episode.q) == steps:
+        return episode
+    arrays = {name: values[:steps] for name, values in vars(episode).items() if name != "diagnostics"}
+    diagnostics = {name: values[:steps] for name, values in episode.diagnostics.items()}
+    return dataclasses.replace(episode, **arrays, diagnostics=diagnostics)
+
+
+def as_long(scenario: Scenario, episode: Episode) -> Scenario:
+    """The scenario with the steps that an episode has."""
+    steps = len(episode.q)
+    return scenario if steps == scenario.steps else scenario.replace(steps=steps)
+
+
+def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> PathScores | None:
+    """How the path was followed; None for a policy without free timing."""
+    if "progress" not in episode.diagnostics:
+        return None
+    task, end = scenario.task, _end(scenario, episode)
+    error = task.error(reference_at(scenario, seeds, episode.diagnostics["progress"]), episode.pose)[:end]
+    first = 0 if task.kind in (POSE, AXIS) else task.error_size - 3
+    position, angles = error[:, first : first + 3], error[:, 3:] if task.kind in (POSE, AXIS) else None
+    return PathScores(
+        None if end is None else end * scenario.dt,
+        float(np.linalg.norm(position, axis=1).max()),
+        None if angles is None else float(np.linalg.norm(angles, axis=1).max()),
+    )
+
+
+def reference_at(scenario: Scenario, seeds: Seeds, progress: FloatArray) -> FloatArray:
+    """Task coordinates of the reference after fractions of steps.
+
+    Args:
+        scenario: The scenario.
+        seeds: Seeds of the episode.
+        progress: Steps of the reference. Shape (k,).
+
+    Returns:
+        Shape (k, m).
+    """
+    points = scenario.points(1)  # the end may be passed by a fraction of a step
+    times = np.interp(progress, np.arange(len(points)), points) * scenario.dt
+    frames = scenario.episode(seeds.seed).frames(times, scenario.model)
+    frames = np.ascontiguousarray(frames if scenario.task.has_orientation else frames[:, -3:])
+    out = np.empty((len(frames), scenario.task.size))
+    nominal_rows(scenario.task.kind, frames, out)
+    return out
+
+
+def _end(scenario: Scenario, episode: Episode) -> int | None:
+    """Steps after which the end of the path was reached; None if it was not."""
+    reached = np.flatnonzero(episode.diagnostics["progress"] >= scenario.steps)
+    return int(reached[0]) + 1 if len(reached) else None

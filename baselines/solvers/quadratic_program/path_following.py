@@ -1,0 +1,229 @@
+"""Path following: the quadratic program with the progress along the reference as one more variable."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from baselines.policy import Memory
+from baselines.policy.parameters import parameter
+from baselines.solvers.linear_algebra import dot
+from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
+from baselines.solvers.quadratic_program.box_minimum import box_minimum
+from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope
+from baselines.solvers.quadratic_program.path_speed import SEGMENTS, joint_path_ahead, path_speed
+from baselines.solvers.quadratic_program.program import (
+    SCALING_WEIGHT,
+    curvature,
+    feedback_share,
+    goal_along_path,
+    held_back,
+    motion_weight,
+    weigh_rotation,
+)
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.resolved_rate.base import APPLIED
+from baselines.status import Status
+from ikgym.kernels import tasks
+from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.limits import CHANGE, FASTEST
+from ikgym.validation import FloatArray, number
+
+LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
+# Samples that the spline needs ahead.
+FEWEST = 4
+# The second solve aims at the speed that the first one reached, and takes back what the first one gave for speed.
+SOLVES = 2
+# What is aimed at for the speed of the reference, since the damping takes something off, and what is no progress.
+AMPLE, STUCK = 1.05, 1e-6
+# The speed that no limit of the path ahead goes below, the error in [m] or [rad] from which on the reference slows down
+# for the arm, and a short part of a step.
+CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
+
+
+class PathNumbers(NamedTuple):
+    """The parameters of :class:`PathFollowing` as its kernel takes them.
+
+    Attributes:
+        program: Those of the quadratic program.
+        stride: Steps of the reference in a segment of the path ahead.
+        segments: Number of segments.
+        latest: Most steps behind the reference.
+        fastest: Largest joint motion in one step that the path ahead is planned with, in [rad] or [m]. Shape (n,).
+        change: Largest change of it from step to step. Shape (n,).
+    """
+
+    program: QuadraticProgramNumbers
+    stride: int
+    segments: int
+    latest: int
+    fastest: FloatArray
+    change: FloatArray
+
+
+@kernel
+def path_step(model, numbers, seen, memory, answer):
+    """One step of :class:`PathFollowing`; see :class:`CompiledPolicy` for the arguments."""
+    program, latest = numbers.program, numbers.latest
+    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, program.limits, program.pull
+    n, e = q.shape[1], tasks.error_size(model.kind, seen.pose.shape[1])
+    hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
+    lower, upper, preferred, jac = np.empty(n + 1), np.empty(n + 1), np.empty(n), np.empty((e, n))
+    motion, missing, shift = np.empty(e), np.empty(e), np.empty(e)
+    for row in range(q.shape[0]):
+        samples, steps, progress = memory.samples[row], memory.steps[row], memory.progress[row]
+        remember(samples, steps, seen.nominal[row])
+        speed = _path_ahead(
+            model, numbers, samples, progress, memory.speed[row], seen.pose[row], q[row], jac, motion, missing
+        )
+        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        for j in range(n):
+            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
+        weigh_rotation(model.kind, program.rotation_weight, jac, motion, missing)
+        jac *= dt
+        missing *= program.gain
+        weight = motion_weight(jac, missing, program.damping, program.lm_damping, limits[FASTEST])
+        curvature(jac, SCALING_WEIGHT * weight, hessian)
+        if program.braking_share > 0.0:
+            missing *= feedback_share(hessian, jac, missing, program.braking_share * limits[CHANGE])
+        least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
+        aim = speed
+        for _ in range(SOLVES):
+            length = goal_along_path(jac, motion, missing, SCALING_WEIGHT * weight, preferred, aim, hessian, linear)
+            lower[n], upper[n] = least * length, length
+            answer.iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
+            made = min(max(x[n] / length, least), 1.0) if length > 0.0 else min(max(speed, least), 1.0)
+            if made > 0.999 * min(speed, 1.0):
+                break
+            aim = made
+        memory.steps[row], memory.progress[row], memory.speed[row] = steps + 1, progress + made, made
+        for j in range(n):
+            answer.qdot[row, j] = x[j]
+        for a in range(e):
+            shift[a] = missing[a] + made * motion[a]
+        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper)
+        stuck = made <= max(least, STUCK) < speed
+        answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
+
+
+@inlined
+def _readiness(error):
+    """Share of the speed that an arm off the path is left: none from twice AWAY on."""
+    return min(max(2.0 - error / AWAY, 0.0), 1.0)
+
+
+@inner
+def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, motion, missing):
+    """Where the path is, and where it leads.
+
+    Args:
+        model: The :class:`Model`.
+        numbers: The :class:`PathNumbers`.
+        samples: Samples of the reference. Shape (L, m).
+        progress: How far along the reference, in steps of it.
+        last: The speed of the step before.
+        pose: Measured task coordinates. Shape (m,).
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        jacobian: Receives J. Shape (e, n).
+        motion: Receives the motion of the reference at full speed, in one step. Shape (e,).
+        missing: Receives the error against the reference at this progress. Shape (e,).
+
+    Returns:
+        The speed to aim at, in steps of the reference by steps; above 1 where nothing is in the way.
+    """
+    first, (e, n) = int(progress), jacobian.shape
+    part = progress - first
+    moves, passed, tangents = np.empty((4, e)), np.empty(e), np.empty((numbers.segments, n))
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    moves_around(model.kind, samples, first, moves)
+    moved(moves, part, passed)
+    tasks.error(model.kind, samples[first % samples.shape[0]], pose, missing)
+    missing += passed
+    slope(moves, part, SHORT, motion)
+    joint_path_ahead(model, numbers.program, samples, first, passed, motion, q, numbers.stride, tangents)
+    speed = path_speed(tangents, numbers.stride, part, last, numbers.fastest, numbers.change)
+    slope(moves, part, max(speed, SHORT), motion)  # that of this step
+    speed = (max(speed, CRAWL) if speed < 1.0 else AMPLE) * _readiness(math.sqrt(dot(missing, missing)))
+    forward_and_jacobian(model.chain, q, rotation, position, geometric)
+    tasks.jacobian(model.kind, rotation, geometric, jacobian)
+    return speed
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PathFollowing(VelocityProgram):
+    """`qp` with free timing: where limits bind, the arm follows the path more slowly instead of leaving it.
+
+    The progress s in one step, from 0 to 1 steps of the reference, is one more variable of the quadratic program:
+    ‖J q̇ Δt − s Δx − e‖² + w (s* − s)² ‖Δx‖² + w ρ ‖q̇ − z‖² is minimised over q̇ and s, with w = 0.01, the motion Δx
+    of the reference, and the error e against the reference at the arm's own progress. Path comes before speed, and
+    speed before joint motion. Lost time is not made up for: no path is followed faster than it is shown.
+
+    s* is the largest speed from which the arm can come to rest where the view ends, within the limits of velocity and
+    acceleration (:func:`path_speed`), along the joint path of the smallest joint motions. Samples of the reference are
+    remembered until they are passed, and are joined by a cubic spline. More than 1 cm or
+    0.01 rad off the path the progress is slower, and from twice that on the reference waits for the arm.
+
+    The status is ``saturated`` where a joint stands at a bound and the error that is left weighs more than the motion,
+    and where the arm is as late as it may be, and is led on at full speed.
+
+    Args:
+        problem: The scenario as the policy knows it, with the limits of the model.
+        gain, damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight: See
+            :class:`VelocityProgram`.
+        lookahead: How far ahead the reference is seen, in [s]: as long as the arm needs for braking.
+        longest_lateness: How far the arm may fall behind the reference, in [s].
+        acceleration_share: Share of the acceleration limits that the speed along the path reckons with. Above 0, at
+            most 1.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    lookahead: float = parameter(0.2, number, above=0.0, at_most=60.0)
+    longest_lateness: float = parameter(2.0, number, above=0.0, at_most=3600.0)
+    acceleration_share: float = parameter(0.9, number, above=0.0, at_most=1.0)
+
+    name: ClassVar[str] = "qp_path"
+    step = path_step
+
+    @property
+    def free_timing(self) -> bool:
+        """See :attr:`SolverPolicy.free_timing`."""
+        return True
+
+    @property
+    def preview(self) -> int:
+        """The steps of ``lookahead``, four at least."""
+        return max(FEWEST, math.ceil(self.lookahead / self.problem.dt))
+
+    @property
+    def _latest(self) -> int:
+        """The steps of ``longest_lateness``."""
+        return math.ceil(self.longest_lateness / self.problem.dt)
+
+    def memory(self, rows: int) -> PathMemory:
+        """See :meth:`SolverPolicy.memory`."""
+        kept = self._latest + self.preview + 2
+        samples = np.zeros((rows, kept, self.problem.task.size))
+        return PathMemory(samples, np.zeros(rows, dtype=np.int64), np.zeros(rows), np.zeros(rows))
+
+    def numbers(self) -> PathNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        dt, model = self.problem.dt, self.problem.model
+        stride = max(2, math.ceil(self.preview / SEGMENTS))
+        return PathNumbers(
+            self.program_numbers(scaling=True),
+            stride,
+            self.preview // stride,
+            self._latest,
+            dt * self.problem.largest_qdot,
+            self.acceleration_share * dt * dt * model.acceleration_limit,
+        )
+
+    def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
+        """``progress`` along the reference, in steps of it."""
+        return {"progress": PathMemory(*self.memory_of(state)).progress.copy()}

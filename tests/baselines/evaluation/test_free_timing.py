@@ -1,0 +1,116 @@
+"""Policies with free timing in the table: time and error along the path, beside the costs on the clock."""
+
+import json
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.episodes import Seeds, add_up, rollout
+from baselines.evaluate import evaluate
+from baselines.evaluation import report
+from baselines.evaluation.free_timing import reference_at
+from baselines.evaluation.motion.stop import FEWEST
+from baselines.evaluation.records import records
+from tests.baselines.solvers.quadratic_program.paths import circle
+
+TASKS = ("pose", "axis", "position", "matrix", "skew")
+
+
+def too_fast(**changes):
+    return circle(speed=2.5, acceleration=100.0, **changes)
+
+
+def row(scenario, policy="qp_path", **options):
+    (one,) = evaluate(scenario, policy, **options)
+    return one
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_row_has_the_time_and_the_error_along_the_path(task):
+    scenario = too_fast(task=ikgym.tasks.get(task))
+    one = row(scenario)
+    assert one.steps == scenario.steps
+    assert 1.5 * scenario.steps < one.path_time / scenario.dt < 4 * scenario.steps
+    assert one.path_position_error < 5e-5 < 1e-2 < one.position_error_max
+    assert (one.path_orientation_error is None) == (task not in ("pose", "axis"))
+    assert (one.path_orientation_error or 0.0) < 1e-4
+
+
+def test_the_error_is_the_distance_from_the_path_itself():
+    """Against the tool of the played joint motion, and the circle that it is to follow."""
+    scenario = too_fast()
+    played = baselines.track(scenario, "qp_path:longest_lateness=0.1")
+    tool = scenario.arm.forward(played.q)[1]
+    centre = scenario.arm.forward(scenario.arm.home)[1] - [0.05, 0.0, 0.0]
+    distance = np.hypot(np.linalg.norm((tool - centre)[:, :2], axis=1) - 0.05, tool[:, 2] - centre[2])
+    one = row(scenario, "qp_path:longest_lateness=0.1")
+    assert 1e-3 < distance.max() <= one.path_position_error  # which has what is missing along the path, too
+
+
+def test_costs_are_those_of_the_clock_alone():
+    scenario = too_fast()
+    one, episode = row(scenario), rollout(scenario, baselines.make("qp_path", scenario), 0)
+    assert one.total_cost == add_up(episode.tracking_cost + episode.velocity_cost)
+    assert sum(one.status_counts.values()) == scenario.steps
+    assert one.position_error_max == episode.position_error.max()
+
+
+def test_a_path_that_can_be_driven_takes_its_own_time():
+    scenario = circle()
+    assert row(scenario).path_time == pytest.approx(scenario.steps * scenario.dt, rel=1e-9)
+
+
+def test_a_path_whose_end_is_not_reached_has_no_time():
+    scenario = too_fast()
+    one = row(scenario.replace(arm=scenario.arm.replace(velocity_limit=0.05 * scenario.arm.velocity_limit)))
+    assert one.path_time is None
+    assert one.path_position_error < 1e-3
+    assert report.PATH[0].cell(report.summarise([one])[0]) == "–"
+
+
+def test_tables_mark_the_kind_and_others_have_no_such_columns():
+    scenario = too_fast()
+    rows = evaluate(scenario, ["qp", "qp_path"])
+    text, plain = report.table(rows), report.table(rows[:1])
+    assert "qp_path ‡" in text
+    assert "‡ free timing" in text
+    assert "path time" in text
+    assert "‡" not in plain
+    assert "path" not in plain.split("\n", 1)[1]
+    assert rows[0].path_time is None
+    qp, free = sorted(records(rows), key=lambda line: line["policy"])
+    assert (qp["path_time_s"], free["path_time_s"]) == (None, rows[1].path_time)
+    assert (qp["path_error_mm"], free["path_error_mm"]) == (
+        1e3 * rows[0].position_error_max,
+        1e3 * rows[1].path_position_error,
+    )
+    assert "path_time_s" not in records(rows[:1])[0]
+
+
+def test_the_motion_that_is_exported_goes_on_to_the_end_of_the_path(tmp_path):
+    scenario = too_fast()
+    one = row(scenario, out=tmp_path, export="joint-trajectory", report=False)
+    (file,) = (tmp_path / "export").rglob("*.json")
+    points = json.loads(file.read_text())["points"]
+    steps = round(one.path_time / scenario.dt)
+    assert steps < len(points) <= steps + 1 + FEWEST  # with the last bit of a stop
+    start, end = (scenario.arm.forward(points[k]["positions"])[1] for k in (0, -1))
+    np.testing.assert_allclose(end, start, rtol=0, atol=1e-4)  # a whole turn
+    header, line = (tmp_path / "results.csv").read_text().splitlines()
+    assert header.endswith("path_time,path_position_error,path_orientation_error")
+    assert float(line.split(",")[-3]) == one.path_time
+
+
+@pytest.mark.parametrize("name", ["varga7-random", "zhang6-lspb", "panda-circle", "khan8-q1"])
+def test_at_whole_steps_the_reference_is_that_of_the_scenario(name):
+    scenario = ikgym.scenarios.get(name).replace(steps=40)
+    there = reference_at(scenario, Seeds(3), np.arange(41.0))
+    np.testing.assert_allclose(there, scenario.nominal(3), rtol=0, atol=1e-12)
+
+
+def test_wrappers_pass_it_on():
+    scenario = too_fast()
+    assert baselines.make("offset_free", scenario, policy="qp_path").free_timing
+    assert not baselines.make("offset_free", scenario, policy="qp").free_timing
