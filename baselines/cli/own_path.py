@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import pathlib
 from typing import Annotated, Any
 
@@ -11,7 +10,6 @@ import tyro
 
 from baselines.cli.parsing import Rule
 from baselines.cli.robot import RobotOptions
-from baselines.paths.motion import path_duration
 from ikgym import scenarios, tasks
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
@@ -81,5 +79,4 @@ def _from_csv(options: OwnPath) -> Scenario:
     trajectory = from_csv(options.file, corner_radius=options.corner_radius, **law)
     task = options.task or ("pose" if trajectory.has_orientation else "position")
     dt = 0.004 if options.dt is None else options.dt
-    scenario = Scenario(pathlib.Path(options.file).stem, arm, tasks.get(task), trajectory, dt=dt, steps=1)
-    return scenario.replace(steps=max(math.ceil(path_duration(scenario) / scenario.dt), 1))
+    return Scenario(pathlib.Path(options.file).stem, arm, tasks.get(task), trajectory, dt=dt)

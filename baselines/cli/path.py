@@ -20,7 +20,7 @@ from baselines.paths.survey import REACHED, follows
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import BoolArray, FloatArray, whole_number
 
 PROGRAM = f"{shell.CONSOLE} path"
 #: Most branches in the table.
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str]) -> int:
 def _head(found: Survey) -> list[str]:
     scenario = found.scenario
     title = f"{scenario.name}: {scenario.arm.name}, task {scenario.task.name}, {found.duration:.3g} s"
-    return [title, "", *_tool(scenario), *_no_acceleration(found)]
+    return [title, "", *_tool(scenario)]
 
 
 def _tool(scenario: Scenario) -> list[str]:
@@ -85,22 +85,11 @@ def _tool(scenario: Scenario) -> list[str]:
     asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
     turning = f", the tool turns by {speeds.angular:.3g} rad/s" if speeds.angular > 1e-6 else ""
     lines = [begins, f"  fastest {speeds.linear:.3g} m/s{asked}{turning}"]
-    short = scenario.steps * scenario.dt
-    if short < 0.999 * getattr(scenario.trajectory, "duration", 0.0):
-        lines.append(f"  the episode ends after {short:.3g} s, before the path: give it more steps")
+    if _unstated(scenario.arm).any():
+        lines.append("  acceleration limits are not stated (see --acceleration): velocities alone are checked")
+    if scenario.cut_off:
+        lines.append(f"  the episode ends {scenario.cut_off:.3g} s before the path: give it more steps, or none")
     return lines
-
-
-def _no_acceleration(found: Survey) -> list[str]:
-    """What is not checked where nobody states the accelerations."""
-    arm = found.scenario.arm
-    if np.isfinite(arm.acceleration_limit).all():
-        return []
-    line = "  acceleration limits are not stated (see --acceleration): velocities alone are checked"
-    if found.best.whole:
-        joint = int(np.argmax(np.where(np.isfinite(arm.acceleration_limit), 0.0, found.best.acceleration)))
-        line += f", peak {found.best.acceleration[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
-    return [line]
 
 
 def _table(found: Survey) -> str:
@@ -112,7 +101,7 @@ def _table(found: Survey) -> str:
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
     arm = scenario.arm
     far, turned = branch.position_error, branch.orientation_error
-    missed = f"{100 * branch.reached:.0f} %, misses {_small(far, 'm') if far > REACHED[0] else _small(turned, 'rad')}"
+    missed = f"{100 * branch.reached:.0f} %, {_small(far, 'm') if far > REACHED[0] else _small(turned, 'rad')}"
     joint, room = int(np.argmin(branch.room)), float(branch.room.min())
     return (
         str(number),
@@ -154,4 +143,20 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
         speed = f"in {driven.duration:.3g} s, at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
         as_asked = found.drivable_within(REACHED)
         can = f"{can}, and {speed}" if as_asked else f"It cannot be driven in {found.duration:.3g} s, but {speed}"
-    return [f"{can}: {how}, all limits hold.", f"start = [{start}]"]
+    hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
+    return [f"{can}: {how}, {hold}.", f"start = [{start}]"]
+
+
+def _unstated(arm: Arm) -> BoolArray:
+    """Joints without a limit of acceleration. Shape (n,)."""
+    unstated: BoolArray = ~np.isfinite(arm.acceleration_limit)
+    return unstated
+
+
+def _peak(driven: Retimed) -> str:
+    """The largest acceleration of a joint without a limit."""
+    arm, motion = driven.scenario.arm, driven.motion
+    steps = np.diff(motion.q[:, 0], axis=0, prepend=motion.q[:1, 0])  # from rest
+    peaks = np.abs(np.diff(steps, axis=0)).max(axis=0) / motion.times[1] ** 2
+    joint = int(np.argmax(np.where(_unstated(arm), peaks, 0.0)))
+    return f"accelerations come to {peaks[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"

@@ -13,6 +13,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.durations import duration
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
 
@@ -49,7 +50,7 @@ def path_duration(scenario: Scenario) -> float:
     """
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
-    ends = getattr(scenario.trajectory, "duration", None)
+    ends = duration(scenario.trajectory)
     return float(scenario.steps * scenario.dt if ends is None else ends)
 
 

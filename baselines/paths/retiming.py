@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -138,12 +139,9 @@ def _followed(found: Survey, branch: Branch, timing: Timing, errors: Errors) -> 
 
 
 def _made(found: Survey, best: _Candidate) -> Retimed:
-    scenario = found.scenario.replace(
-        name=f"{found.scenario.name}-retimed",
-        trajectory=best.timing.of(found.scenario.trajectory),
-        start=best.branch.start,
-        steps=len(best.motion.times) - 1,
-        initial_pose=None,
-        iterations_per_point=1,
-    )
+    changes: dict[str, Any] = {"initial_pose": None, "iterations_per_point": 1}
+    if best.timing.duration != found.duration:
+        changes |= {"trajectory": best.timing.of(found.scenario.trajectory), "steps": None}
+    name = f"{found.scenario.name}-retimed"
+    scenario = found.scenario.replace(name=name, start=best.branch.start, **changes)
     return Retimed(scenario, best.timing.duration, found.duration, best.motion)

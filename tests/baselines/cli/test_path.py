@@ -43,6 +43,7 @@ def test_arms_that_are_not_in_the_catalogue(robot, capsys):
     text = capsys.readouterr().out
     assert "fastest 0.146 m/s, 0.2 m/s was asked, but its bends of 0.03 m allow no more with 1 m/s²" in text
     assert ("acceleration limits are not stated" in text) == (not limits)
+    assert ("all limits hold" if limits else "velocities hold, accelerations come to") in text
     assert "It can be driven as it is: qp follows within 0.0" in text
     scenario = ikgym.scenarios.load("out.toml")
     assert any(name in text for name in scenario.arm.joint_names)
