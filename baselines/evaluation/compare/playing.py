@@ -14,7 +14,7 @@ from baselines.evaluation.compare.rule import PREFERRED, Recommendation, Rows, f
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import Column, plain
+from baselines.evaluation.table import Column, fitting, plain
 from baselines.paths import retime
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
@@ -48,14 +48,15 @@ class Comparison:
         """Table, notes and recommendation as plain text.
 
         Args:
-            width: Characters that a line may have.
+            width: Characters that a line may have. Columns that decide nothing are left out where they do not fit.
         """
         follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
-        columns = (*COLUMNS, follows)
+        lines = summarise(self.rows)
+        columns = fitting((*COLUMNS, follows), lines, width)
         texts = [f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as {WRAPPER}:policy=…"]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
         last = textwrap.fill(str(self.recommendation), width)
-        return "\n".join([plain(columns, summarise(self.rows), width), "", *below, "", last])
+        return "\n".join([plain(columns, lines, width), "", *below, "", last])
 
 
 def solver_of(row: Row) -> str:
@@ -66,7 +67,8 @@ def solver_of(row: Row) -> str:
 COLUMNS = (
     Column("solver", "", lambda one: solver_of(one.first)),
     Column("path", "", lambda one: one.first.scenario),
-    *report.ERRORS,
+    *report.ERRORS[:3],
+    dataclasses.replace(report.ERRORS[3], drop=0),  # decides
     Column("at stop", "[steps]", lambda one: one.total("steps_at_joint_limit")),
     *report.TIMES[:2],
 )
@@ -84,7 +86,8 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     """
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
-    notes = [] if np.isfinite(scenario.arm.acceleration_limit).all() else [UNLIMITED]
+    stated = np.isfinite(scenario.arm.acceleration_limit).all()
+    notes = [] if stated else [f"{report.STATED_NOTE}; --acceleration states limits"]
     paths = [scenario.replace(name=AS_IT_IS), *_retimed(scenario, notes)]
     played = evaluate(paths, PREFERRED, progress=progress)
     notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
@@ -94,9 +97,6 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     delayed = evaluate(driven, [f"{WRAPPER}:policy={name}" for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
     return Comparison(scenario.dt, [*played, *delayed], chosen, notes)
-
-
-UNLIMITED = "no limits of acceleration are known for all joints: state them, for example with --acceleration"
 
 
 def late(plant: Plant) -> Plant:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from baselines.evaluation.metrics import Row
+from baselines.evaluation.table import number
 
 #: Solvers in the order in which they are preferred.
 PREFERRED = ("qp", "sns", "rhc_foresight", "dls", "pink", "mink")
@@ -109,7 +110,7 @@ def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float) -> str
         return why
     if name in late and (why := fault(late[name], dt)):
         return f"{why} with late drives"
-    return f"needs {rows[name].qddot_peak / least:.3g} times the acceleration of the calmest"
+    return f"needs {number(rows[name].qddot_peak / least)} times the acceleration of the calmest"
 
 
 def _first_fault(rows: Rows, dt: float) -> str:

@@ -35,7 +35,7 @@ def test_qp_is_taken_where_nothing_stands_in_the_way():
         (MISSES, "qp errs by 12.3 mm."),
         (STOPPED, "qp has a joint at a stop."),
         (SLOW, "qp takes 2001 µs a call of a period of 4000 µs."),
-        (HARSH, "qp needs 3.1 times the acceleration of the calmest."),
+        (HARSH, "qp needs 3.100 times the acceleration of the calmest."),
     ],
 )
 def test_the_next_one_is_taken_where_qp_has_a_fault(change, reason):
@@ -61,7 +61,9 @@ def test_who_follows_with_late_drives_takes_precedence():
     assert (chosen.solver, chosen.late) == ("qp", False)
     assert chosen.reason == "qp follows the path, but not with late drives."
     chosen = recommend(rows(qp=HARSH), {}, ALL_MISS, DT)
-    assert chosen.reason.startswith("qp needs 3.1 times the acceleration of the calmest. sns follows the path, but not")
+    assert chosen.reason.startswith(
+        "qp needs 3.100 times the acceleration of the calmest. sns follows the path, but not"
+    )
 
 
 def test_a_path_is_retimed_only_where_no_solver_follows_it():
