@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,8 +39,3 @@ def rounded(value: float, digits: int = 4) -> float:
 def one_line(values: Mapping[str, Any]) -> str:
     """An object on a line."""
     return json.dumps(values, ensure_ascii=False, allow_nan=False)
-
-
-def with_list(values: Mapping[str, Any], name: str, items: Iterable[str]) -> str:
-    """The JSON of an object with one more member, a list with each item on lines of its own."""
-    return f'{one_line(values)[:-1]}, "{name}": [\n' + ",\n".join(items) + "\n]}"

@@ -9,7 +9,7 @@ A file of ranges has a table a solver, called by its specification, with one lin
 A parameter with a dot is a key of a parameter that is a table itself: ``"options.gain"``. One with ``when = { rule =
 ["chan"] }`` is varied only if a parameter above it has one of these values.
 
-One file, although long: the checks of ranges and of a folder of trials need what the search is made of.
+One file, although long: ranges and folders of trials are checked with the parts of a search.
 """
 
 from __future__ import annotations

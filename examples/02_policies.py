@@ -9,6 +9,7 @@ import ikgym
 
 
 def main() -> None:
+    """Prints the mean return of two policies."""
     scenario = ikgym.scenarios.get("varga7-random").replace(steps=300)
     for name, parameters in [("dls", {"damping": 1e-2}), ("rhc_gradient", {"gradient": "analytic"})]:
         policy = baselines.make(name, scenario, **parameters)

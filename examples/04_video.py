@@ -12,6 +12,7 @@ import ikgym  # noqa: F401  # registers the environment
 
 
 def main(path: Path, steps: int = 3000) -> None:
+    """Writes a video of an episode."""
     policy = baselines.make("dls", "varga7-fast")
     env = gym.make("RedundantIK-v0", scenario="varga7-fast", preview=policy.preview, render_mode="rgb_array")
     observation, _ = env.reset()

@@ -28,6 +28,7 @@ def features(observation: dict) -> torch.Tensor:
 
 
 def network(inputs: int, outputs: int, scale: float) -> nn.Sequential:
+    """Two hidden layers, and a last one whose weights are scaled."""
     layers = nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, outputs))
     with torch.no_grad():
         layers[-1].weight.mul_(scale)
@@ -87,6 +88,7 @@ def advantages(batch: dict, value_after: torch.Tensor) -> torch.Tensor:
 
 
 def update(agent: Agent, optimiser: torch.optim.Optimizer, batch: dict) -> None:
+    """Some epochs of gradient steps on minibatches of the clipped objective."""
     flat = {name: part.flatten(0, 1) for name, part in batch.items()}
     for _ in range(EPOCHS):
         for rows in torch.randperm(ENVS * STEPS).chunk(MINIBATCHES):
@@ -103,6 +105,7 @@ def update(agent: Agent, optimiser: torch.optim.Optimizer, batch: dict) -> None:
 
 
 def main(updates: int = 30, seed: int = 0) -> list[float]:
+    """Trains an agent, and returns the mean reward of each update."""
     torch.manual_seed(seed)
     torch.set_num_threads(1)  # networks are small
     # Rows whose episode has ended are reset in the same step: every transition is one of an episode.

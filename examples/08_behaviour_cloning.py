@@ -54,6 +54,7 @@ def recorded(episodes):
 
 
 def main(episodes=32, epochs=5, validated=4):
+    """Clones a policy, and compares the two on validation episodes."""
     torch.manual_seed(0)
     torch.set_num_threads(1)  # the layers are too small to share out
     seen, done = recorded(episodes)

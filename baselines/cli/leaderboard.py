@@ -87,14 +87,7 @@ def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work, RULES)
 
 

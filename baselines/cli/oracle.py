@@ -206,14 +206,7 @@ def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 1 if a record fails the check, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line, by default the process's; returns the exit code: 1 if a record fails the check."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     return shell.run(lambda: _carry_out(given), lambda: "Stopped. Optima that were found are kept.")
 

@@ -135,14 +135,7 @@ Files in the folder of --out:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     return shell.run(lambda: _carry_out(given))
 

@@ -116,14 +116,7 @@ def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work, RULES)
 
 

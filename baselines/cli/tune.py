@@ -58,14 +58,7 @@ Files:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments of the command; taken from the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     program = "ikgym tune"
     return shell.run_resumable(Options, arguments, program, manual, _work)
 

@@ -59,14 +59,7 @@ Examples:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments of the command; taken from the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     return shell.run(lambda: _film(parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)))
 

@@ -6,13 +6,12 @@ from scipy.optimize import lsq_linear
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.horizon import horizon_cost
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, forward, plan_cost
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from tests.baselines.solvers.receding_horizon.data import data_of
+from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost
 
 TASKS = ikgym.tasks.names()
 

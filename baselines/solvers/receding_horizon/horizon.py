@@ -42,27 +42,19 @@ class ProblemData(NamedTuple):
 
 
 @inner
-def horizon_cost(data, q, nominal, qdot):
-    """Φ, the sum of the stage costs over the horizon.
+def difference_gradient(data, q, nominal, qdot, delta, gradient):
+    """∂Φ/∂q̇ by forward differences (Varga 2021, section IV), and Φ, the sum of the stage costs over the horizon.
 
     Args:
-        data: The :class:`baselines.solvers.receding_horizon.horizon.ProblemData`; limits do not count.
+        data: The :class:`ProblemData`; limits do not count.
         q: Joint coordinates at the first grid point. Shape (n,).
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
-        qdot: Joint velocities. Shape (HL - 1, n).
+        qdot: Joint velocities, put back as they were. Shape (HL - 1, n).
+        delta: The difference.
+        gradient: Receives the gradient. Shape (HL - 1, n).
 
     Returns:
         The cost.
-    """
-    stages = np.empty(qdot.shape[0])
-    return _roll(data, q.copy(), nominal, qdot, 0, stages, frame_workspace(data.kind, nominal))
-
-
-@inner
-def difference_gradient(data, q, nominal, qdot, delta, gradient):
-    """∂Φ/∂q̇ by forward differences of ``delta`` (Varga 2021, section IV), and Φ; arguments as above.
-
-    The velocities are put back as they were; ``gradient`` (HL - 1, n) receives the gradient.
     """
     steps, n = qdot.shape
     workspace = frame_workspace(data.kind, nominal)

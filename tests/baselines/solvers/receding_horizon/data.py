@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.horizon import ProblemData, analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
 
 HORIZONS = pytest.mark.parametrize(
@@ -18,6 +18,10 @@ def data_of(problem) -> ProblemData:
     return ProblemData(
         model.chain, problem.task.kind, cost, problem.dt, model.lower, model.upper, problem.velocity_limit
     )
+
+
+def horizon_cost(data, q, nominal, qdot):
+    return analytic_gradient(data, q, nominal, qdot, np.empty_like(qdot))
 
 
 def constraints(dt, stages, n):

@@ -7,9 +7,9 @@ import pytest
 import baselines
 import ikgym
 from baselines import episodes
-from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient, horizon_cost
+from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
 from baselines.status import Status
-from tests.baselines.solvers.receding_horizon.data import data_of
+from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost
 from tests.every_scenario import ONE_OF_EACH
 
 
@@ -77,7 +77,7 @@ def test_gradients_against_central_differences(name, steps):
     common = (data_of(scenario), q, nominal)
     analytic, forward = np.empty_like(qdot), np.empty_like(qdot)
     value = analytic_gradient(*common, qdot, analytic)
-    assert value == horizon_cost(*common, qdot) == difference_gradient(*common, qdot, 1e-7, forward)
+    assert value == difference_gradient(*common, qdot, 1e-7, forward)
     assert value == pytest.approx(phi(scenario, q, nominal, qdot), rel=1e-9)
     central = np.empty_like(qdot)
     for index in np.ndindex(qdot.shape):

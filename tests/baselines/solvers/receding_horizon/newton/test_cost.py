@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import horizon_cost
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, knot_workspace
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from tests.baselines.solvers.receding_horizon.data import horizon_cost
 from tests.baselines.solvers.receding_horizon.newton.problems import place
 
 ARMS = ["varga7", "varga7_literal", "khan8", "zhang3", "puma560", "faitli3"]
