@@ -163,12 +163,6 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
-def demo() -> str:
-    """The table of the README."""
-    readme = (PAGES.parent / "README.md").read_text(encoding="utf-8")
-    return readme.partition("<!-- demo -->\n")[2].partition("\n<!-- end -->")[0]
-
-
 TABLES = {
     "arms": arms,
     "tasks": tasks,
@@ -184,7 +178,6 @@ TABLES = {
 }
 #: Texts that are no tables.
 TEXTS: dict[str, Callable[[], str]] = {
-    "demo": demo,
     "claims": claims,
 }
 
