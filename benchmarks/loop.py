@@ -12,14 +12,14 @@ from baselines import Controller, Drives
 from benchmarks.measuring import FULL, Effort
 from benchmarks.table import Table
 
-#: The rows: policy, scenario, drives, and whether references are rotations and positions.
-LOOPS: dict[str, tuple[str, str, Drives | str, bool]] = {
-    "`qp`, perfect drives": ("qp", "panda-circle", Drives(), False),
-    "`qp`, perfect drives, rotations": ("qp", "panda-circle", Drives(), True),
-    "`qp`, drives given": ("qp", "panda-circle", Drives(2, 0.02), False),
-    "`qp`, drives identified": ("qp", "panda-circle", "identify", False),
-    "`rhc_foresight`, perfect drives": ("rhc_foresight", "varga7-pose-random", Drives(), False),
-    "`rhc_foresight`, perfect drives, rotations": ("rhc_foresight", "varga7-pose-random", Drives(), True),
+#: The rows: policy, scenario, drives, and how references are given.
+LOOPS: dict[str, tuple[str, str, Drives | str, str]] = {
+    "`qp`, perfect drives": ("qp", "panda-circle", Drives(), "coordinates"),
+    "`qp`, drives given": ("qp", "panda-circle", Drives(2, 0.02), "coordinates"),
+    "`qp`, drives identified": ("qp", "panda-circle", "identify", "coordinates"),
+    "`rhc_foresight`, perfect drives": ("rhc_foresight", "varga7-pose-random", Drives(), "coordinates"),
+    "the same, all rotations": ("rhc_foresight", "varga7-pose-random", Drives(), "rotations"),
+    "the same, newest rotation": ("rhc_foresight", "varga7-pose-random", Drives(), "newest"),
 }
 #: Turns of `effort.steps` calls of each.
 TURNS = 10
@@ -35,20 +35,20 @@ def tables(effort: Effort = FULL) -> list[Table]:
     return [Table("Control loop", note, ("`predict` [µs]", "`step` [µs]", "more [µs]", "`step`, p99 [µs]"), rows)]
 
 
-def measured(policy: str, scenario: str, drives: Drives | str, pairs: bool, steps: int, turns: int) -> tuple[Any, Any]:
+def measured(policy: str, scenario: str, drives: Drives | str, given: str, steps: int, turns: int) -> tuple[Any, Any]:
     """Durations of `predict`, and of steps on the same measurements, in [µs]; they take turns."""
     which = ikgym.scenarios.get(scenario)
     controller = Controller(which, policy, drives)
     controller.warm_up(1)
     predict, step = [], []
     for _ in range(turns):
-        durations, seen = _steps(controller, which, pairs, steps)
+        durations, seen = _steps(controller, which, given, steps)
         step += durations
         predict += _predictions(controller.policy, seen)
     return 1e-3 * np.array(predict), 1e-3 * np.array(step)
 
 
-def _steps(controller: Controller, scenario: ikgym.Scenario, pairs: bool, steps: int) -> tuple[list[int], list[Any]]:
+def _steps(controller: Controller, scenario: ikgym.Scenario, given: str, steps: int) -> tuple[list[int], list[Any]]:
     """Durations of steps on a perfect arm in [ns], and what its policy saw."""
     controller.reset()
     ahead, durations, observations = controller.ahead, [], []
@@ -58,7 +58,8 @@ def _steps(controller: Controller, scenario: ikgym.Scenario, pairs: bool, steps:
     for k in range(min(steps, scenario.steps)):
         here = slice(k + 1, k + 1 + ahead)
         pose = scenario.task.coordinates(*scenario.arm.forward(q))
-        reference = (rotations[here], positions[here]) if pairs else nominal[here]
+        which = here if k == 0 or given != "newest" else k + ahead
+        reference = nominal[here] if given == "coordinates" else (rotations[which], positions[which])
         begin = time.perf_counter_ns()
         command = controller.step(q, pose, reference)
         durations.append(time.perf_counter_ns() - begin)

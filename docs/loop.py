@@ -28,11 +28,11 @@ from ikgym.trajectories.time_laws import Trapezoidal
 
 #: Policies, and what the controller is told of the drives.
 LOOPS = (
-    ("qp", "perfect"),
-    ("qp:gain=0.06", "perfect"),
     ("qp", "identify"),
     ("qp", "given"),
     ("rhc_foresight", "identify"),
+    ("qp", "perfect"),
+    ("qp:gain=0.06", "perfect"),
 )
 PERIODS, LAGS, DELAYS = (0.001, 0.004), (None, 0.02), range(4)
 SECONDS, FIRST = 2.0, 1.0

@@ -117,7 +117,8 @@ class Controller:
             pose: Measured pose of the tool: task coordinates of shape (m,), or rotation (3, 3) and position (3,) in
                 [m]. None where it is not measured: then it is the model's at q.
             reference: The pose wanted at the end of this period, and then as many as the policy looks ahead, see
-                :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
+                :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m]. Once these
+                were given, the newest rotation (3, 3) and position (3,) will do: the others move up.
             qdot: Measured joint velocities in [rad/s] or [m/s]; what was returned last if left out. Shape (n,).
             q_age: Control periods since q was measured.
             pose_age: The same of the pose.
@@ -128,16 +129,14 @@ class Controller:
         Raises:
             InvalidInputError: Something has a wrong shape, or the reference is too short.
         """
-        n = self._joints
-        measured = numbers("q", q, (n,))
-        speed = self._last.copy() if qdot is None else numbers("qdot", qdot, (n,))
-        seen, nominal = self._seen(pose, measured), self._window.ahead(reference)
-        if len(nominal) != self._shown:
-            nominal = self._wanted(nominal)
+        measured = numbers("q", q, (self._joints,))
+        speed = self._last.copy() if qdot is None else self._speed(qdot)
+        seen, ahead = self._seen(pose, measured), self._window.ahead(reference)
+        nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         if self._stopped is None:
             ages = float(q_age), float(pose_age)
             reason = kernels.watch(
-                *(measured, speed, seen, nominal, *ages),
+                *(measured, speed, seen, ahead, *ages),
                 *(self._kind, self._bounds, self._numbers, self._kept, self._counters),
             )
             if reason == 0:
@@ -191,6 +190,14 @@ class Controller:
             raise InvalidInputError("report: expected a step to be made first.")
         return self.policy.report(self._state)
 
+    def _speed(self, qdot: npt.ArrayLike) -> FloatArray:
+        """Measured joint velocities, no faster than the arm can be; the first ones are what commands begin with."""
+        fastest = self._problem.largest_qdot
+        speed: FloatArray = np.clip(numbers("qdot", qdot, (self._joints,)), -fastest, fastest)
+        if self._made == 0 and np.isfinite(speed).all():
+            self._last[:] = speed
+        return speed
+
     def _seen(self, pose: Pose | None, q: FloatArray) -> FloatArray:
         """Task coordinates of the measured pose, or of the model's at q. Shape (m,)."""
         if pose is not None:
@@ -225,8 +232,6 @@ class Controller:
         if self._state[0][0] == _DIVERGED:
             self._stopped = StopReason.POLICY
             return self._braked()
-        if self._made == 0:
-            self._last[:] = qdot
         self._made += 1
         out = np.empty_like(q)
         kernels.command(self._limits, q, action[0], self._unit, self._last, self._problem.dt, self._kept, out)
@@ -242,6 +247,7 @@ class Controller:
         """Durations in [s] of calls along the scenario's reference, on a perfect arm; one more compiles."""
         scenario, ahead, spent = self._scenario, self.ahead, []
         nominal, start = scenario.nominal(0, ahead), scenario.first_q(scenario.episode(0))
+        self._touch()
         q, k = start, 0
         for _ in range(calls + 1):
             begin = time.perf_counter()
@@ -252,3 +258,10 @@ class Controller:
                 self.reset()
                 q, k = start, 0
         return spent[1:]
+
+    def _touch(self) -> None:
+        """Compiles what the first periods may not need: poses as rotation and position, and a stop."""
+        pose = np.eye(3), np.zeros(3)
+        self._seen(pose, np.zeros(self._joints))
+        self._window.ahead((pose[0][None], pose[1][None]))
+        self._braked()

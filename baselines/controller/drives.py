@@ -72,8 +72,8 @@ def policy_for(
         oldest: The oldest measurements that there may be, in steps.
 
     Raises:
-        InvalidInputError: The drives are neither, or the policy is none, belongs to another scenario, or has no name by
-            which it could be made anew.
+        InvalidInputError: The drives are neither, or told twice; or the policy is none, belongs to another scenario, or
+            has no name by which it could be made anew.
         UnknownNameError: There is no such policy, or parameter of it.
     """
     if not isinstance(drives, Drives) and drives != IDENTIFY:
@@ -84,7 +84,10 @@ def policy_for(
     if perfect and isinstance(policy, SolverPolicy):
         return policy
     name, parameters = _named(policy)
-    if perfect or any(kind.name == PREDICTED for kind in policies_in((name, parameters))):
+    inside = any(kind.name == PREDICTED for kind in policies_in((name, parameters)))
+    if inside and isinstance(drives, Drives) and not perfect:
+        raise InvalidInputError(f"drives: {name} predicts by itself; give it delay and bandwidth, got {drives}.")
+    if perfect or inside:
         return registry.make(name, scenario, **parameters)
     known: dict[str, Any] = {}
     if isinstance(drives, Drives):

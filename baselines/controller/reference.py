@@ -75,7 +75,7 @@ class Window:
     """Task coordinates of the poses ahead, which move up by one in each control period.
 
     Rotations and positions are compared with those of the period before. Those that only moved up are not converted
-    again.
+    again; where the newest pose comes alone, nothing is compared.
 
     Args:
         task: The task.
@@ -95,23 +95,33 @@ class Window:
         """Task coordinates of the poses ahead. Shape (p, m).
 
         Args:
-            reference: Task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
+            reference: Task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m]; or the newest
+                rotation (3, 3) and position (3,) alone, the others having moved up.
 
         Raises:
             InvalidInputError: They have another shape.
         """
         if not is_pair(reference):
             return numbers("reference", reference, (None, self._task.size))
-        rotations = numbers("reference", reference[0], (None, 3, 3))  # type: ignore[index]  # a pair
-        positions = numbers("reference", reference[1], (len(rotations), 3))  # type: ignore[index]
+        first, second = reference  # type: ignore[misc, str-unpack]  # a pair
+        if np.ndim(second) == 1:
+            rotations, positions = numbers("reference", first, (3, 3))[None], numbers("reference", second, (3,))[None]
+            self._move_up()
+            self._convert(rotations, positions)
+        else:
+            rotations = numbers("reference", first, (None, 3, 3))
+            self._take(rotations, numbers("reference", second, (len(rotations), 3)))
+        return self._coordinates[self._start : self._start + self._length]
+
+    def _take(self, rotations: FloatArray, positions: FloatArray) -> None:
+        """Takes over all poses ahead, and converts the new ones."""
         if len(positions) != self._length:
             self.clear(len(positions))
         if self._matches(rotations, positions, 1):
             self._move_up()
-            self._convert(rotations, positions, self._length - 1)
+            self._convert(rotations[-1:], positions[-1:])
         elif not self._matches(rotations, positions, 0):
-            self._convert(rotations, positions, 0)
-        return self._coordinates[self._start : self._start + self._length]
+            self._convert(rotations, positions)
 
     def _matches(self, rotations: FloatArray, positions: FloatArray, shift: int) -> bool:
         """Whether poses are those of before without the first ones, but for as many at the end."""
@@ -121,14 +131,17 @@ class Window:
 
     def _move_up(self) -> None:
         """Drops the first pose; where the room ends, the others are copied to its beginning."""
+        if self._length == 0:
+            self.clear(1)
         self._start += 1
         if self._start + self._length > len(self._coordinates):
             for array in (self._rotations, self._positions, self._coordinates):
                 array[: self._length - 1] = array[self._start : self._start + self._length - 1]
             self._start = 0
 
-    def _convert(self, rotations: FloatArray, positions: FloatArray, first: int) -> None:
-        """Converts the poses from one on."""
-        here = slice(self._start + first, self._start + self._length)
-        self._rotations[here], self._positions[here] = rotations[first:], positions[first:]
-        convert(self._task.kind, rotations[first:], positions[first:], self._coordinates[here])
+    def _convert(self, rotations: FloatArray, positions: FloatArray) -> None:
+        """Converts the last poses ahead."""
+        end = self._start + self._length
+        here = slice(end - len(positions), end)
+        self._rotations[here], self._positions[here] = rotations, positions
+        convert(self._task.kind, rotations, positions, self._coordinates[here])

@@ -44,8 +44,9 @@ def test_random_actions_lose_the_track_where_they_may():
     assert all(value > 0.0 for value in table.rows["N = 3"])
 
 
+@pytest.mark.filterwarnings("ignore:.* does not keep")  # the machine may be busy
 def test_the_loop_is_timed_beside_its_policy(monkeypatch):
-    monkeypatch.setattr(loop, "LOOPS", {name: loop.LOOPS[name] for name in list(loop.LOOPS)[1:4:2]})
+    monkeypatch.setattr(loop, "LOOPS", {name: loop.LOOPS[name] for name in list(loop.LOOPS)[2::3]})
     (table,) = loop.tables(measuring.QUICK)
     assert all(step > 0.0 and 0.0 < predict < 1e9 for predict, step, *_ in table.rows.values())
     assert len(table.rows) == 2

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.tasks import pose_rows
 from ikgym.validation import BoolArray, FloatArray, IntArray
 
 #: How much of a residual stays from step to step: what drifts, such as a bias, is no sign of a delay.
@@ -254,3 +255,36 @@ def past_rows(steps, lags, memory, out):
         k = min(steps[row], path.shape[2] - 1)
         for j in range(out.shape[1]):
             out[row, j] = (1.0 - share) * path[row, low, k, j] + share * path[row, high, k, j]
+
+
+@kernel
+def offset_rows(chain, kind, dt, share, before, batch, lags, memory, off):
+    """How far arms are from where the drives should have brought them, and measured poses from those of the model.
+
+    Args:
+        chain: The model of the arm.
+        kind: The kind of task coordinates.
+        dt: Δt in [s].
+        share: Share of a new offset of the pose. Shape (B,).
+        before: The delays that were assumed in the step before. Shape (B,).
+        batch: Measured joint coordinates (B, n) and poses (B, m), and how many steps ago that was. Shapes (B,).
+        lags: Shape (L,).
+        memory: A plain :class:`PredictedMemory`, changed in place.
+        off: Receives the difference of the joint coordinates, in [rad] or [m]. Shape (B, n).
+    """
+    q, pose, q_age, pose_age = batch
+    delay, arm_q, arm_qdot, offset = memory[7], memory[10], memory[11], memory[12]
+    seen, modelled = np.empty_like(q), np.empty_like(pose)
+    past_rows(delay + q_age, lags, memory, off)
+    past_rows(delay + pose_age, lags, memory, seen)
+    for row in range(q.shape[0]):
+        # With another delay the arm that is driven belongs to another time: by how it moves, not with a jump.
+        shift = dt * (delay[row] - before[row])
+        for j in range(q.shape[1]):
+            arm_q[row, j] += shift * arm_qdot[row, j]
+            off[row, j] = q[row, j] - off[row, j]
+            seen[row, j] += off[row, j]
+    pose_rows(chain, kind, seen, modelled)
+    for row in range(q.shape[0]):
+        for i in range(pose.shape[1]):
+            offset[row, i] += share[row] * (pose[row, i] - modelled[row, i] - offset[row, i])

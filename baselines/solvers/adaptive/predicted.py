@@ -17,6 +17,7 @@ from baselines.solvers.adaptive.drives import (
     PredictedMemory,
     evidence_rows,
     identify_rows,
+    offset_rows,
     past_rows,
     start_memory,
 )
@@ -119,7 +120,7 @@ class Predicted(NamedWrapper):
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         own, inside = self.split(memory)
-        kept = PredictedMemory(*map(np.copy, own))
+        kept = PredictedMemory(*[array.copy() for array in own])
         off = self._observe(batch, kept)
         step = self.ask(self._shown(batch, kept), inside)
         behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
@@ -167,17 +168,16 @@ class Predicted(NamedWrapper):
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
         """Takes in what is measured, and tells how far the arm is from where the drives should have brought it."""
-        fresh = ~kept.begun
-        kept.arm_q[fresh], kept.arm_qdot[fresh] = batch.q[fresh], batch.qdot[fresh]
-        q_age, pose_age = (_steps(age, len(fresh)) for age in (batch.q_age, batch.pose_age))
-        delay = kept.delay.copy()
+        share, problem = np.full(len(batch.q), self.gain), self.problem
+        if not kept.begun.all():
+            fresh = ~kept.begun
+            kept.arm_q[fresh], kept.arm_qdot[fresh], share[fresh] = batch.q[fresh], batch.qdot[fresh], 1.0
+        q_age, pose_age = _steps(batch.q_age, len(share)), _steps(batch.pose_age, len(share))
+        before, off = kept.delay.copy(), np.empty_like(batch.q)
         identify_rows(batch.q, q_age, tuple(self._hypotheses), tuple(kept))
-        # With another delay the arm that is driven belongs to another time: by how it moves, not with a jump.
-        kept.arm_q[:] += self.problem.dt * (kept.delay - delay)[:, None] * kept.arm_qdot
-        off: FloatArray = batch.q - self._past(kept.delay + q_age, kept)
-        seen = self._past(kept.delay + pose_age, kept) + off
-        share = np.where(fresh, 1.0, self.gain)[:, None]
-        kept.offset[:] += share * (batch.pose - self._pose(seen) - kept.offset)
+        seen = batch.q, batch.pose, q_age, pose_age
+        model = problem.model.chain, problem.task.kind, problem.dt
+        offset_rows(*model, share, before, seen, self._hypotheses.lags, tuple(kept), off)
         return off
 
     def _shown(self, batch: Batch, kept: PredictedMemory) -> Batch:

@@ -88,9 +88,9 @@ def faulty(scenario, controller, nominal, kind, rng):
     return np.array(commands), due
 
 
-def check(number, seed=20):
+def check(name, number, seed=20):
     rng = np.random.default_rng(seed)
-    scenario = circle("panda", 4e-3, seconds=2.4)
+    scenario = circle(name, 4e-3, seconds=2.4)
     controller = Controller(scenario)
     nominal, arm = scenario.nominal(0, controller.ahead), scenario.arm
     for i in range(number):
@@ -104,10 +104,12 @@ def check(number, seed=20):
         assert stopped == (not commands[-1].any())
 
 
-def test_some_faults():
-    check(2 * len(FAULTS))
+@pytest.mark.parametrize("name", ["panda", "ur10"])
+def test_some_faults(name):
+    """An arm with limits of acceleration, and one without."""
+    check(name, 2 * len(FAULTS))
 
 
 @pytest.mark.slow
 def test_500_faults():
-    check(500, seed=7)
+    check("panda", 500, seed=7)

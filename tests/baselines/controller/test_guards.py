@@ -148,3 +148,10 @@ def test_a_policy_that_fails_is_a_reason(scenario, how, monkeypatch, caplog):
 def test_what_the_loop_cannot_make_anew(scenario):
     with pytest.raises(InvalidInputError, match="expected one with a name"):
         Controller(scenario, Failing.for_scenario(scenario))
+
+
+def test_a_measured_velocity_beyond_the_limits_is_no_reason_to_go_on_with_it(scenario):
+    loop = Loop(scenario)
+    for _ in range(3):
+        loop.step(qdot=np.full(7, 1e9))
+        assert (np.abs(loop.qdot) <= scenario.arm.velocity_limit).all()

@@ -144,6 +144,7 @@ def test_who_may_control():
         (lambda: Drives(-1), "delay: expected a whole number of at least 0, got -1"),
         (lambda: Drives(2, -0.02), "time_constant: expected a finite number from 0 to"),
         (lambda: Controller("varga7-fast", drives="known"), "drives: expected Drives.…. or 'identify', got 'known'"),
+        (lambda: Controller("panda-circle", "predicted", Drives(2)), "drives: predicted predicts by itself"),
         (lambda: Guards(age=-1), "age: expected a whole number of at least 0"),
         (lambda: Guards(tolerance=None), "tolerance: expected a finite number above 0, got None"),
         (lambda: Guards(position_error=np.inf), "position_error: expected a finite number above 0, got inf"),

@@ -36,6 +36,18 @@ def test_only_the_new_pose_is_converted(name, counted):
     assert counted == [LENGTH] + [1] * (39 - LENGTH)
 
 
+def test_the_newest_pose_comes_alone(counted):
+    task, (rotations, positions) = ikgym.tasks.get("pose"), poses(20)
+    window, expected = Window(task), task.coordinates(rotations, positions)
+    window.ahead((rotations[:LENGTH], positions[:LENGTH]))
+    for k in range(LENGTH, 20):
+        given = rotations[k], positions[k]
+        np.testing.assert_array_equal(window.ahead(given), expected[k + 1 - LENGTH : k + 1])
+    assert counted == [LENGTH] + [1] * (20 - LENGTH)
+    window.clear()
+    np.testing.assert_array_equal(window.ahead((rotations[3], positions[3])), expected[3:4])
+
+
 def test_other_poses_are_all_converted(counted):
     task, (rotations, positions) = ikgym.tasks.get("pose"), poses(12)
     window = Window(task)
@@ -75,6 +87,7 @@ def test_changes_of_the_caller_are_seen():
     [
         ((np.zeros((2, 3, 2)), np.zeros((2, 3))), r"reference: expected shape \(any, 3, 3\), got \(2, 3, 2\)"),
         ((np.zeros((2, 3, 3)), np.zeros((3, 3))), r"reference: expected shape \(2, 3\), got \(3, 3\)"),
+        ((np.zeros((3, 3)), np.zeros(2)), r"reference: expected shape \(3,\), got \(2,\)"),
         (np.zeros((2, 6)), r"reference: expected shape \(any, 12\), got \(2, 6\)"),
     ],
 )
