@@ -41,6 +41,7 @@ _import_paths: dict[str, str] = {
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
     "offset_free": f"{_SOLVERS}.adaptive.offset_free:OffsetFree",
     "calibrated": f"{_SOLVERS}.adaptive.calibrated:Calibrated",
+    "filter_bank": f"{_SOLVERS}.adaptive.filter_bank:FilterBank",
     "predicted": f"{_SOLVERS}.adaptive.predicted:Predicted",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from baselines.agents.recurrent.network import step_network
-from baselines.solvers.adaptive.calibrated import absorb
 from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
 from baselines.solvers.adaptive.deviation import deviation_between
+from baselines.solvers.adaptive.kalman import absorb
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward

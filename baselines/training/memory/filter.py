@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from baselines.agents.recurrent import kernels
 from baselines.agents.recurrent.network import GatedNetwork
 from baselines.agents.recurrent.processing import Recurrent
-from baselines.solvers.adaptive.calibrated import CURVATURE
+from baselines.solvers.adaptive.kalman import CURVATURE
 from baselines.training.memory.episodes import Measurements
 
 #: Factor of the first weights of the last layer.
