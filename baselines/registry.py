@@ -67,7 +67,6 @@ _import_paths: dict[str, str] = {
 #: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
-    "recurrent": "baselines.agents.recurrent.policy:RecurrentPolicy",
     "published": f"{_SOLVERS}.references.published:Published",
     "told": f"{_SOLVERS}.references.told:Told",
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -14,7 +14,6 @@ import numpy.typing as npt
 from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.policy.arguments import pack, remembered, replace_rows
-from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, known_names
@@ -176,21 +175,3 @@ class NamedWrapper(Wrapper, abc.ABC):
     def commands(self) -> int:
         """See :attr:`SolverPolicy.commands`."""
         return self.inner.commands
-
-
-def policies_in(spec: PolicySpec) -> Iterator[type[SolverPolicy]]:
-    """The classes of all policies that a spec names: its own, and those of inner policies.
-
-    Args:
-        spec: Such as ``"smoothed:policy=dls"``.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: The text has another form.
-    """
-    name, parameters = parse_policy(spec)
-    kind = registry.get(name)
-    yield kind
-    if issubclass(kind, NamedWrapper):
-        options = parameters.get("options", {})
-        yield from policies_in((parameters.get("policy", kind.policy), options if isinstance(options, Mapping) else {}))

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from baselines.training.config import APG, PPO, SAC, Observe
+from baselines.training.config import APG, PPO, SAC
 from baselines.training.methods import METHODS, configure, get, preset_names
 from ikgym.exceptions import IkgymError, InvalidInputError
 from tests.baselines.training.small import tiny
@@ -31,13 +31,6 @@ REFUSED = [
     (APG, {"averaging": 1.5}, "averaging"),
     (APG, {"damping": 0.0}, "damping"),
     (APG, {"reset_distance": -1.0}, "reset_distance"),
-    (Observe, {"n_envs": 40}, "n_envs: expected a multiple of 16 plants"),
-    (Observe, {"measurements": 1}, "measurements: expected a whole number of at least 2"),
-    (Observe, {"batch_size": 129}, "batch_size: expected a whole number from 1 to 128"),
-    (Observe, {"group_size": 1}, "group_size: expected a whole number of at least 2, got 1"),
-    (Observe, {"gamma": 0.0}, "gamma"),
-    (Observe, {"log_std_end": 3.0}, "log_std_end"),
-    (Observe, {"estimator": "pppo"}, r"estimator 'pppo'\. Did you mean 'ppo'"),
     (PPO, {"settings": ["n_steps"]}, "set: expected NAME=VALUE, got 'n_steps'"),
     (SAC, {"learning": ["furthst=1"]}, "Did you mean 'furthest'"),
     (SAC, {"total_timesteps": 2}, "total_timesteps: expected a whole number of at least 20"),
