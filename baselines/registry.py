@@ -42,6 +42,7 @@ _import_paths: dict[str, str] = {
     "broyden": f"{_SOLVERS}.adaptive.broyden:Broyden",
     "offset_free": f"{_SOLVERS}.adaptive.offset_free:OffsetFree",
     "calibrated": f"{_SOLVERS}.adaptive.calibrated:Calibrated",
+    "filter_bank": f"{_SOLVERS}.adaptive.filter_bank:FilterBank",
     "predicted": f"{_SOLVERS}.adaptive.predicted:Predicted",
     "rhc_gradient": f"{_SOLVERS}.receding_horizon.gradient:RecedingHorizonGradient",
     "rhc_lagrange": f"{_SOLVERS}.receding_horizon.lagrange:RecedingHorizonLagrange",
@@ -67,7 +68,6 @@ _import_paths: dict[str, str] = {
 #: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
-    "recurrent": "baselines.agents.recurrent.policy:RecurrentPolicy",
     "published": f"{_SOLVERS}.references.published:Published",
     "told": f"{_SOLVERS}.references.told:Told",
 }

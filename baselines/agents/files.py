@@ -10,7 +10,8 @@ from typing import Any, Final
 from safetensors.numpy import load, save
 
 import ikgym
-from baselines.agents.processing import NetworkLike, Processing
+from baselines.agents.network import Network
+from baselines.agents.processing import Processing
 from baselines.canonical import canonical
 from baselines.files import ResultsError, read_bytes, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
@@ -47,7 +48,7 @@ class AgentFile:
     """
 
     source: str
-    network: NetworkLike
+    network: Network
     processing: Processing
     about: Mapping[str, Any]
     hash: str
@@ -59,7 +60,7 @@ class AgentFile:
 
 
 def agent_of(
-    network: NetworkLike,
+    network: Network,
     processing: Processing,
     scenario: Scenario,
     training: Mapping[str, Any] | None = None,
@@ -144,14 +145,14 @@ def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) 
         if not all(isinstance(about[part][name], (str, int)) for name in names):
             raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")
     processing = kinds[kind].from_json(described)
-    network = kinds[kind].network.from_json(about["network"], tensors)
+    network = Network.from_json(about["network"], tensors)
     found = _digest(network, about)
     if found != claimed:
         raise ValueError(f"it was changed after it was written: expected the hash {claimed}, got {found}")
     return AgentFile(source, network, processing, about, found)
 
 
-def _digest(network: NetworkLike, about: Mapping[str, Any]) -> str:
+def _digest(network: Network, about: Mapping[str, Any]) -> str:
     """The hash of a description and of the tensors in their order."""
     out = hashlib.sha256(canonical(about).encode())
     for name, tensor in network.tensors.items():

@@ -1,4 +1,4 @@
-"""Learned agents without memory as policies."""
+"""Learned agents as policies."""
 
 import dataclasses
 import os
@@ -12,8 +12,7 @@ import numpy.typing as npt
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.bounds import Bounds
 from baselines.agents.files import AgentFile, load_agent
-from baselines.agents.network import Network
-from baselines.agents.processing import Acting, Held, Processing
+from baselines.agents.processing import Held, Processing
 from baselines.agents.relative import Relative
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
@@ -83,12 +82,11 @@ class LearnedPolicy(SolverPolicy):
         seen = full_orientation.full_problem(self.problem) if skew else self.problem
         check_scenario(file, seen, any_arm=any_arm)
         processing = file.processing
-        assert isinstance(processing, Acting)
         try:
             needed = processing.size(seen), processing.outputs(seen)
         except InvalidInputError as e:
             raise InvalidInputError(f"Agent {file.source}: {e}") from None
-        shape = file.network.sizes[0], file.network.sizes[-1]  # type: ignore[attr-defined]
+        shape = file.network.sizes[0], file.network.sizes[-1]
         if shape != needed:
             raise InvalidInputError(
                 f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
@@ -117,7 +115,6 @@ class LearnedPolicy(SolverPolicy):
     def memory(self, rows: int) -> Memory:
         """Nothing held, and an evaluation of the network due."""
         processing = self.file.processing
-        assert isinstance(processing, Acting)
         held = Held(np.zeros((rows, processing.held(self.seen))), np.zeros(rows, dtype=np.int64))
         return AgentMemory(*held, *full_orientation.start_memory(rows))
 
@@ -130,8 +127,6 @@ class LearnedPolicy(SolverPolicy):
             batch, orientation = full_orientation.resolve_orientation(self.problem, batch, orientation)
             batch = batch._replace(nominal=batch.nominal.take(np.array(self._offsets) - 1, axis=1))
         processing, network = self.file.processing, self.file.network
-        assert isinstance(processing, Acting)
-        assert isinstance(network, Network)
         assert self.interval is not None
         fractions = processing.act(self.seen, batch, network, self.interval, held)
         if self.bounds is not None:

@@ -1,9 +1,9 @@
-"""The interfaces of networks, and of processings: observations to features, network outputs to actions."""
+"""The interface of processings: observations to features, network outputs to actions."""
 
 import abc
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -15,32 +15,25 @@ from ikgym.scenarios.preview import offsets as checked_offsets
 from ikgym.validation import FloatArray, Frozen, known_names
 
 
-class NetworkLike(Protocol):
-    """A network that can be written to the file of an agent and read again."""
+class Held(NamedTuple):
+    """The result of a network, held until its next evaluation.
 
-    @property
-    def tensors(self) -> dict[str, npt.NDArray[np.float32]]:
-        """All tensors by name, in the order in which they are hashed."""
+    Attributes:
+        values: Shape (B, k).
+        left: Steps until the next evaluation. Shape (B,).
+    """
 
-    def to_json(self) -> dict[str, Any]:
-        """The sizes of the layers, and the functions between them."""
-
-    @classmethod
-    def from_json(cls, about: Mapping[str, Any], tensors: Mapping[str, npt.NDArray[Any]]) -> Self:
-        """The inverse of :meth:`to_json`, with the tensors.
-
-        Raises:
-            InvalidInputError: They do not fit together.
-        """
+    values: FloatArray
+    left: npt.NDArray[np.int64]
 
 
-class Processing(Frozen):
-    """A frozen dataclass whose field values are stored in the file of an agent."""
+class Processing(Frozen, abc.ABC):
+    """Of an agent whose network is evaluated at intervals, and that acts in every step; the file holds its fields."""
 
     #: The name of the class in files.
     kind: ClassVar[str]
-    #: The class of its network.
-    network: ClassVar[type[NetworkLike]]
+    #: Steps from one evaluation of the network to the next in the training.
+    interval: int
 
     def to_json(self) -> dict[str, Any]:
         """The kind and the fields, as JSON values."""
@@ -56,25 +49,6 @@ class Processing(Frozen):
         """
         known_names("field of the processing", values, ["kind", *_fields(cls)])
         return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if name != "kind"})
-
-
-class Held(NamedTuple):
-    """The result of a network, held until its next evaluation.
-
-    Attributes:
-        values: Shape (B, k).
-        left: Steps until the next evaluation. Shape (B,).
-    """
-
-    values: FloatArray
-    left: npt.NDArray[np.int64]
-
-
-class Acting(Processing, abc.ABC):
-    """The processing of an agent whose network is evaluated at intervals, and that acts in every step."""
-
-    #: Steps from one evaluation of the network to the next in the training.
-    interval: int
 
     @abc.abstractmethod
     def size(self, problem: Problem) -> int:

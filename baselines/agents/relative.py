@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.network import Network, forward_rows
-from baselines.agents.processing import Acting, Held, check_offsets
+from baselines.agents.processing import Held, Processing, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.outcome import OBSERVED
@@ -20,7 +20,7 @@ Squash = Literal["clip", "tanh"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Relative(Acting):
+class Relative(Processing):
     """Joint velocities in units of the remaining twist, from the features of :class:`ikgym.rl.AgentObservation`.
 
     The velocity of a joint is a · s (0.2 + |v̂|), with a = gain · (network output), kept within ±largest.
@@ -45,7 +45,6 @@ class Relative(Acting):
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
 
     kind: ClassVar[str] = "relative"
-    network: ClassVar = Network
     #: Steps for which an action was held in the training.
     interval = 1
 
@@ -71,7 +70,7 @@ class Relative(Acting):
         return problem.model.joints
 
     def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
-        """See :meth:`Acting.act`."""
+        """See :meth:`Processing.act`."""
         out = np.empty(batch.q.shape)
         ahead = problem.task.kind, problem.model.chain, problem.dt, self._ahead, self.furthest
         meaning = self.squash == "tanh", self.gain, self.largest, problem.velocity_limit

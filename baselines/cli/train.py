@@ -63,12 +63,7 @@ class Repeat(RunOptions):
 RULES = (
     Rule(("--workers",), lambda given: given.options.cluster is None, "with --cluster"),
     Rule(("--workers",), lambda given: len(set(given.options.seeds)) > 1 or given.options.workers < 2, "on one seed"),
-    Rule(
-        ("--group-size", "--n-epochs", "--clip-range", "--gamma", "--log-std-init", "--log-std-end"),
-        lambda given: given.config.estimator == "ppo",
-        "without --estimator ppo",
-    ),
-    Rule(("--learning-rate-end", "--log-std-end"), lambda given: given.config.segments > 1, "in one segment"),
+    Rule(("--learning-rate-end",), lambda given: given.config.segments > 1, "in one segment"),
     Rule(
         ("--reset-distance",),
         lambda given: len(given.config.window) > 1,
@@ -83,8 +78,7 @@ def manual() -> str:
     prog, evaluate = _program(), shell.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm, ppo, sac and
-td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec, observe trains agents with memory for plants that
-differ from the model. Each method has its own options: {prog} METHOD --help
+td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec. Each method has its own options: {prog} METHOD --help
 
 {shell.listing("Methods", methods.METHODS)}
 
@@ -105,8 +99,7 @@ Files in the folder of a run, which may be killed at any time:
   history.json       a row for each segment
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      the state, for --resume
-  agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE;
-                     of observe for: {evaluate} --policies recurrent:FILE
+  agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""

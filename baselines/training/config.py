@@ -13,7 +13,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.recurrent.processing import Recurrent
 from ikgym import scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.rl import Learning
@@ -21,8 +20,6 @@ from ikgym.scenarios import Scenario
 from ikgym.validation import Frozen, check_sizes, flag, known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
-#: How `observe` estimates its gradient.
-Estimator = Literal["analytic", "ppo"]
 
 #: Upper bounds, so that a typing error gives a message and does not exhaust the memory.
 MOST_ARMS, MOST_LAYERS, MOST_NEURONS = 10_000, 10, 2048
@@ -231,84 +228,6 @@ class APG(ActorOnly):
 
     def _stage(self, segment: int) -> int:
         return segment * len(self.window) // self.segments
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Observe(ActorOnly):
-    """An agent with memory for plants that differ from the model: a recurrent network tunes a Kalman filter.
-
-    Each segment has new random plants: calibration, payload, and noise, rate and losses of the camera. The gradient of
-    the costs of the filter's estimates is back-propagated through all measurements of an episode, or estimated from
-    costs alone.
-    """
-
-    method: ClassVar[str] = "observe"
-
-    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-field"
-    """The scenario with the arm and the paths; agents are validated on its own plant."""
-    base_policy: Annotated[str, tyro.conf.arg(metavar="POLICY")] = Recurrent.base_policy
-    """The policy that is corrected; it matters in the validation alone."""
-    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (32,)
-    """Units of the recurrent layers."""
-    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 128
-    """Episodes of a segment, a multiple of the plants."""
-    segments: Annotated[int, tyro.conf.arg(metavar="N")] = 40
-    """Number of parts of the training, of about five core-seconds each."""
-    evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 40
-    """Segments between validations; the untrained and the final agent are always validated."""
-    validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Episodes of each validation: the first seeds of the split "validation"."""
-    plants: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Random plants in a segment; each episode draws an arm and noise from one of them."""
-    measurements: Annotated[int, tyro.conf.arg(metavar="N")] = 96
-    """Measurements of an episode; gradients are back-propagated through all of them."""
-    gradient_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 10
-    """Gradient steps of a segment."""
-    batch_size: Annotated[int, tyro.conf.arg(metavar="N")] = 32
-    """Episodes of one gradient step."""
-    step_cost: Annotated[float, tyro.conf.arg(metavar="X")] = 0.13
-    """The cost of a step without error: the objective is the logarithm of the cost of an episode."""
-    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-3
-    """Learning rate of Adam in the first segment."""
-    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 3e-4
-    """Learning rate in the last segment; in between it decays geometrically."""
-    estimator: Estimator = "analytic"
-    """How the gradient is estimated. analytic: back-propagation through filter and network. ppo: proximal policy
-    optimisation (Schulman et al. 2017) from the costs of estimates, with noise on the network output; each episode is
-    repeated group_size times with different noise."""
-    group_size: Annotated[int, tyro.conf.arg(metavar="N")] = 8
-    """For ppo: repetitions of each episode in a batch, at least two."""
-    n_epochs: Annotated[int, tyro.conf.arg(metavar="N")] = 4
-    """For ppo: gradient steps on a batch."""
-    clip_range: Annotated[float, tyro.conf.arg(metavar="ε")] = 0.2
-    """For ppo: largest distance of the probability ratio from 1."""
-    gamma: Annotated[float, tyro.conf.arg(metavar="γ")] = 0.95
-    """For ppo: discount factor, from one measurement to the next."""
-    log_std_init: Annotated[float, tyro.conf.arg(metavar="X")] = -1.0
-    """For ppo: logarithm of the standard deviation of the noise in the first segment."""
-    log_std_end: Annotated[float, tyro.conf.arg(metavar="X")] = -2.0
-    """For ppo: the same in the last segment; in between it changes linearly."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_names("estimator", [self.estimator], get_args(Estimator))
-        self._whole("plants", "gradient_steps", "n_epochs")
-        self._whole("measurements", "group_size", at_least=2)
-        self._whole("batch_size", at_most=self.n_envs)
-        self._numbers("clip_range", "step_cost", above=0.0)
-        self._numbers("gamma", above=0.0, at_most=1.0)
-        self._numbers("log_std_init", "log_std_end", at_least=-20.0, at_most=2.0)
-        if self.n_envs % self.plants:
-            raise InvalidInputError(f"n_envs: expected a multiple of {self.plants} plants, got {self.n_envs}.")
-
-    @property
-    def processing(self) -> Recurrent:
-        """The base policy and the prior of the filter."""
-        return Recurrent(self.base_policy)
-
-    def log_std_of(self, segment: int) -> float:
-        """The logarithm of the standard deviation in a segment, counted from 0."""
-        return self.log_std_init + (self.log_std_end - self.log_std_init) * segment / max(self.segments - 1, 1)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import importlib
 import pathlib
 from typing import TYPE_CHECKING, Any
 
-from baselines.training.config import APG, PPO, SAC, TD3, Config, Observe
+from baselines.training.config import APG, PPO, SAC, TD3, Config
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario
@@ -15,14 +15,13 @@ if TYPE_CHECKING:  # the command line is read without PyTorch
     from baselines.training.trainers.base import Trainer
 
 #: Configurations by the names of their methods; the docstring of each describes the method on the command line.
-METHODS: dict[str, type[Config]] = {kind.method: kind for kind in (PPO, SAC, TD3, APG, Observe)}
+METHODS: dict[str, type[Config]] = {kind.method: kind for kind in (PPO, SAC, TD3, APG)}
 #: Modules and classes of the trainers, which are called with configuration, scenario and seed.
 _TRAINERS = {
     "ppo": ("sb3", "SB3Trainer"),
     "sac": ("sb3", "SB3Trainer"),
     "td3": ("sb3", "SB3Trainer"),
     "apg": ("apg", "APGTrainer"),
-    "observe": ("observe", "ObserveTrainer"),
 }
 #: The presets that come with the training: a table for each, with a table for each method.
 PRESETS = pathlib.Path(__file__).with_name("presets.toml")

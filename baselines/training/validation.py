@@ -16,8 +16,6 @@ import numpy.typing as npt
 from baselines import registry
 from baselines.agents.files import AgentFile
 from baselines.agents.policy import Agent
-from baselines.agents.recurrent.policy import RecurrentPolicy
-from baselines.agents.recurrent.processing import Recurrent
 from baselines.episodes import add_up, play, rollouts
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.summary import geometric_mean
@@ -73,14 +71,13 @@ def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     return scenarios.seeds("validation", episodes if random else 1)
 
 
-def bound(agent: AgentFile, scenario: Scenario) -> Agent | RecurrentPolicy:
+def bound(agent: AgentFile, scenario: Scenario) -> Agent:
     """An agent as a policy for a scenario.
 
     Raises:
-        IkgymError: The scenario or its base policy does not fit the agent.
+        IkgymError: The scenario does not fit the agent.
     """
-    kind = RecurrentPolicy if isinstance(agent.processing, Recurrent) else Agent
-    return kind(Problem.of(scenario), given=agent)
+    return Agent(Problem.of(scenario), given=agent)
 
 
 def validate(agent: AgentFile, scenario: Scenario, episodes: int) -> Score:

@@ -9,9 +9,9 @@ import pytest
 
 import baselines
 from baselines.policy import Problem
-from baselines.wrapper import NamedWrapper, policies_in
+from baselines.wrapper import NamedWrapper
 from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
 
 PROBLEM = Problem.of(scenarios.get("varga7-fast"))
@@ -74,19 +74,3 @@ def test_a_wrapper_of_a_few_lines(name):
 def test_what_cannot_be_inside(parameters, message):
     with pytest.raises(InvalidInputError, match=message):
         Halved(PROBLEM, **parameters)
-
-
-def test_policies_that_a_spec_names():
-    def names(spec):
-        return [kind.name for kind in policies_in(spec)]
-
-    assert names("dls:damping=1e-2") == ["dls"]
-    assert names("smoothed") == ["smoothed", "rhc_gradient"]
-    assert names("full_orientation:policy=rhc") == ["full_orientation", "rhc"]
-    assert names("smoothed:policy=full_orientation,options={'policy': 'mfac'}") == [
-        "smoothed",
-        "full_orientation",
-        "mfac",
-    ]
-    with pytest.raises(UnknownNameError, match="no parameter of dls 'dampng'"):
-        names("smoothed:policy=dls,options={'dampng': 1}")

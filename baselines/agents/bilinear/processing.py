@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from baselines.agents.bilinear.kernels import law_rows
 from baselines.agents.network import Network
-from baselines.agents.processing import Acting, Held, check_offsets
+from baselines.agents.processing import Held, Processing, check_offsets
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
@@ -19,7 +19,7 @@ from ikgym.validation import FloatArray, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
-class Bilinear(Acting):
+class Bilinear(Processing):
     """q̇ = G v + h s: joint velocities linear in the remaining twist, with G and h from the network.
 
     v is the twist that removes the error from the next reference pose within Δt: feedback and feed-forward in one. The
@@ -67,7 +67,6 @@ class Bilinear(Acting):
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
 
     kind: ClassVar[str] = "bilinear"
-    network: ClassVar = Network
 
     def __post_init__(self) -> None:
         offsets, ahead = check_offsets(self.offsets)
@@ -121,7 +120,7 @@ class Bilinear(Acting):
         return problem.model.joints * (int(twist_size(problem.task.kind)) + 1)
 
     def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
-        """See :meth:`Acting.act`."""
+        """See :meth:`Processing.act`."""
         out = np.empty(batch.q.shape)
         scene = problem.task.kind, problem.model.chain, problem.dt, self._ahead
         damping = 0.0 if self.damping is None else self.damping

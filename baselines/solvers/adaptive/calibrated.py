@@ -10,16 +10,12 @@ import numpy.typing as npt
 
 from baselines.policy import Batch
 from baselines.policy.parameters import parameter
-from baselines.solvers.adaptive.chain_parameters import changed_chain, parameter_twists
 from baselines.solvers.adaptive.corrected import Corrected, Measurement
-from baselines.solvers.adaptive.deviation import deviation_between
+from baselines.solvers.adaptive.kalman import absorb, linearise, prior_covariance, write_deviation
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.kinematics import forward
+from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, flag, number
 
-#: Second derivatives of a pose by joint zeros and tilts: those of an arm of some 1 m, in [1/m] and [1/rad].
-CURVATURE = 1.0
 #: In squared standard deviations a measurement is expected to be e from what was expected. What it is farther than
 #: TOLERATED e adds up, and beyond ALARM the arm has changed: by noise alone about once in a million measurements.
 TOLERATED, ALARM = 2.0, 30.0
@@ -96,10 +92,9 @@ class Calibrated(Corrected):
 
     def own_memory(self, rows: int) -> CalibrationMemory:
         """See :meth:`Wrapper.own_memory`."""
-        n = self.problem.model.joints
-        deviations = np.repeat([self.zero, self.link, self.axis], [n, 3 * n + 3, 2 * n])
-        covariance = np.repeat(np.diag(deviations**2)[None], rows, axis=0)
-        parameters, quiet = np.zeros((rows, len(deviations))), np.full(rows, PAUSE)
+        prior = prior_covariance(self.problem.model.joints, self.zero, self.link, self.axis)
+        covariance = np.repeat(prior[None], rows, axis=0)
+        parameters, quiet = np.zeros((rows, len(prior))), np.full(rows, PAUSE)
         return CalibrationMemory(*self.sensors(rows), parameters, covariance, quiet, np.zeros(rows))
 
     def own_restarted(self, own: CalibrationMemory, rows: npt.NDArray[np.bool_]) -> CalibrationMemory:
@@ -148,16 +143,12 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation, old):
     """
     chain, kind, variances, walk, jump = rule
     n = q.shape[1]
-    offsets, axes, tool = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)
-    rotation, position, model_rotation, model_position = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)
+    parts = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)
     for row in range(q.shape[0]):
         parameters, covariance = known.parameters[row], known.covariance[row]
         for i in range(n):
             covariance[i, i] += walk
-        forward(chain, q[row], model_rotation, model_position)
-        arm = changed_chain(chain, parameters, offsets, axes, tool)
-        forward(arm, q[row] + parameters[:n], rotation, position)
-        deviation_between(kind, rotation, position, model_rotation, model_position, old[row])
+        arm = write_deviation(chain, kind, parameters, q[row], parts, old[row])
         deviation[row] = old[row]
         if new[row]:
             known.quiet[row] += 1
@@ -166,9 +157,7 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation, old):
             known.surprise[row], jumped = improve(arm, kind, test, then[row], pose[row], parameters, covariance)
             if jumped:
                 known.quiet[row] = 0
-            arm = changed_chain(chain, parameters, offsets, axes, tool)
-            forward(arm, q[row] + parameters[:n], rotation, position)
-            deviation_between(kind, rotation, position, model_rotation, model_position, deviation[row])
+            write_deviation(chain, kind, parameters, q[row], parts, deviation[row])
 
 
 @kernel
@@ -190,15 +179,10 @@ def improve(arm, kind, rule, q, pose, parameters, covariance):
     """
     variances, jump, before = rule
     n, e, p = q.shape[0], variances.shape[0], parameters.shape[0]
-    rotation, position, predicted = np.empty((3, 3)), np.empty(3), np.empty(pose.shape[0])
-    error, twist, sensitivity = np.empty(e), np.zeros((6, p)), np.empty((e, p))
-    shifted, change, after = q + parameters[:n], np.zeros(p), covariance.copy()
-    forward(arm, shifted, rotation, position)
-    task_kernels.coordinates(kind, rotation, position, predicted)
-    task_kernels.error(kind, pose, predicted, error)
-    parameter_twists(arm, shifted, position, twist)
-    task_kernels.jacobian(kind, rotation, twist, sensitivity)
-    surprise = max(before + absorb(sensitivity, error, variances, change, after) - TOLERATED * e, 0.0)
+    error, sensitivity = np.empty(e), np.empty((e, p))
+    change, after = np.zeros(p), covariance.copy()
+    linearise(arm, kind, q + parameters[:n], pose, error, sensitivity)
+    surprise = max(before + absorb(sensitivity, error, variances, change, after)[0] - TOLERATED * e, 0.0)
     jumped = jump > 0.0 and surprise > ALARM
     if jumped:
         surprise = 0.0
@@ -210,59 +194,3 @@ def improve(arm, kind, rule, q, pose, parameters, covariance):
     for i in range(p):
         parameters[i] += change[i]
     return surprise, jumped
-
-
-@inner
-def absorb(sensitivity, error, variances, change, covariance):
-    """The update by all components of an error, one after the other, since their noises are independent.
-
-    Args:
-        sensitivity: Derivatives by the parameters. Shape (e, p).
-        error: Difference to the measurement. Shape (e,).
-        variances: Of the noises. Shape (e,).
-        change: Of the parameters, from 0. Shape (p,).
-        covariance: Changed in place. Shape (p, p).
-
-    Returns:
-        The sum of squares of what was not expected, in its standard deviations: chi-square with e degrees of freedom.
-    """
-    p, gain, surprise = change.shape[0], np.empty(change.shape[0]), 0.0
-    for k in range(error.shape[0]):
-        variance = gain_of(sensitivity[k], variances[k], CURVATURE, covariance, gain)
-        missing = error[k]
-        for i in range(p):
-            missing -= sensitivity[k, i] * change[i]
-        for i in range(p):
-            change[i] += gain[i] * missing
-        surprise += missing * missing / variance
-    return surprise
-
-
-@inner
-def gain_of(row, variance, curvature, covariance, gain):
-    """The Kalman gain for one number, y = h · x + noise, by which the covariance shrinks.
-
-    Args:
-        row: h. Shape (p,).
-        variance: Of the noise, above 0.
-        curvature: By which share of its variance h · x is off where h is a derivative: the second order adds the noise
-            that a second derivative of this size leaves. 0 where y is linear in x.
-        covariance: Of x, changed in place. Shape (p, p).
-        gain: Receives what x has to change by for each unit by which y is beyond h · x. Shape (p,).
-
-    Returns:
-        The variance of y.
-    """
-    p, spread = row.shape[0], 0.0
-    for i in range(p):
-        gain[i] = 0.0
-        for j in range(p):
-            gain[i] += covariance[i, j] * row[j]
-        spread += row[i] * gain[i]
-    total = spread + variance + (curvature * spread) ** 2
-    for i in range(p):
-        for j in range(p):
-            covariance[i, j] -= gain[i] * gain[j] / total
-    for i in range(p):
-        gain[i] /= total
-    return total

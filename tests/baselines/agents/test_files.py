@@ -9,22 +9,19 @@ from safetensors.numpy import load, save
 import baselines
 import ikgym
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.files import agent_of, load_agent, save_agent
-from baselines.agents.recurrent.processing import Recurrent
+from baselines.agents.files import load_agent, save_agent
 from baselines.agents.relative import Relative
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from tests.baselines.agents.recurrent.recurrent_agents import drawn
 from tests.baselines.random_agents import network, random_agent
 
 SCENARIO = ikgym.scenarios.get("varga7-pose-random")
-KINDS = (Bilinear, Relative, Recurrent)
+KINDS = (Bilinear, Relative)
 AGENTS = {
     "bilinear": random_agent(SCENARIO, processing=Bilinear((1, 5, 20))),
     "damped": random_agent(SCENARIO, processing=Bilinear((1, 5, 20), 1e-2)),
     "relative": random_agent(SCENARIO, processing=Relative((2, 5), 5.0, 2.0, 0.5, "tanh"), training={"seed": 1}),
-    "recurrent": agent_of(drawn(), Recurrent("dls"), SCENARIO),
 }
 
 
@@ -98,7 +95,7 @@ def parts(file):
             (lambda t, a, x=x: a.update(processing=x), f"processing: expected a table, got {x!r}")
             for x in (None, "relative", True)
         ),
-        (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative or recurrent, got 'raw'"),
+        (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),
         (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),

@@ -184,8 +184,6 @@ def test_the_agent_of_the_package():
         baselines.make("agent_alone", RANDOM, hash="0" * 12)
     with pytest.raises(InvalidInputError, match="was trained for the arm varga7"):
         baselines.make("agent_alone", PANDA)
-    assert sorted(file.stem for file in FOLDER.glob("*.safetensors")) == ["agent_alone", "agent_memory"]
+    assert sorted(file.stem for file in FOLDER.glob("*.safetensors")) == ["agent_alone"]
     about = policy.file.about
     assert (about["training"]["method"], about["scenario"]["name"]) == ("apg", "varga7-random")
-    with pytest.raises(ResultsError, match="kind bilinear or relative, got 'recurrent'"):
-        baselines.make("agent", "panda-field", path=str(FOLDER / "agent_memory.safetensors"))

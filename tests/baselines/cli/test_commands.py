@@ -79,9 +79,9 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
         (
             ["train", "pop", "--out", "x"],
-            "no method 'pop'. Did you mean 'ppo'? Available: ppo, sac, td3, apg, observe,",
+            "no method 'pop'. Did you mean 'ppo'? Available: ppo, sac, td3, apg,",
         ),
-        (["train", "--out", "x"], "expected a method, one of ppo, sac, td3, apg, observe, or repeat; got --out."),
+        (["train", "--out", "x"], "expected a method, one of ppo, sac, td3, apg, or repeat; got --out."),
         (["train", "ppo"], "Missing from ikgym train ppo: --out."),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
         (["arms", "none.urdf"], "Cannot read none.urdf"),
@@ -117,7 +117,7 @@ def test_a_mistake_is_one_line_and_ends_with_2(arguments, message, capsys, tmp_p
 
 
 FIXED = "on a scenario that is the same at every reset"
-APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method in ("apg", "observe"))
+APG = ["train", "apg", "--preset", "smoke", "--out", "x"]
 
 
 @pytest.mark.parametrize(
@@ -149,11 +149,6 @@ APG, OBSERVE = (["train", method, "--preset", "smoke", "--out", "x"] for method 
         ([*APG, "--window", "64"], "--reset-distance=1", "with one --window"),
         ([*APG, "--segments", "1"], "--learning-rate-end=1", "in one segment"),
         ([*APG, "--scenario", "varga7-fast"], "--validation-episodes=2", FIXED),
-        (OBSERVE, "--group-size=2", "without --estimator ppo"),
-        *((OBSERVE, f"{option}=1", "without --estimator ppo") for option in (
-            "--n-epochs", "--clip-range", "--gamma", "--log-std-init", "--log-std-end",
-        )),
-        ([*OBSERVE, "--estimator", "ppo", "--segments", "1"], "--log-std-end=-1", "in one segment"),
     ],
 )  # fmt: skip
 def test_an_option_without_effect_is_refused(arguments, option, otherwise, capsys, tmp_path, monkeypatch):

@@ -115,7 +115,6 @@ def test_errors_are_one_line_and_exit_code_2(arguments, message, tmp_path, capsy
         (["ppo", "--set", "n_steps=-3"], "set: ppo refuses n_steps=-3: `n_steps * n_envs` must be greater than 1"),
         (["ppo", "--set", "n_steps=few"], "set: ppo refuses n_steps=few"),
         (["ppo", "--learning", "preview=0"], "preview: expected a whole number of at least 1"),
-        (["observe", "--base-policy", "dlss"], "There is no policy 'dlss'. Did you mean 'dls'?"),
         (["apg", "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
     ],
 )
@@ -132,7 +131,7 @@ def test_what_a_trainer_refuses_replaces_no_run(arguments, message, tmp_path, ca
 def test_no_method(capsys):
     assert main([]) == 2
     printed = capsys.readouterr()
-    assert "Methods: ppo, sac, td3, apg, observe." in printed.out
+    assert "Methods: ppo, sac, td3, apg." in printed.out
     assert printed.err.startswith("error: expected a method, one of ppo, sac, ")
 
 

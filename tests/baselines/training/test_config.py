@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from baselines.training.config import APG, PPO, SAC, Observe
+from baselines.training.config import APG, PPO, SAC
 from baselines.training.methods import METHODS, configure, get, preset_names
 from ikgym.exceptions import IkgymError, InvalidInputError
 from tests.baselines.training.small import tiny
@@ -23,10 +23,6 @@ REFUSED = [
     (APG, {"window": 64}, "window: expected whole numbers, got 64"),
     (APG, {"window": [88]}, "window: expected .* that divide segment_steps, 1920, got 88"),
     (APG, {"averaging": 1.5}, "averaging"),
-    (Observe, {"n_envs": 40}, "n_envs: expected a multiple of 16 plants"),
-    (Observe, {"measurements": 1}, "measurements: expected a whole number of at least 2"),
-    (Observe, {"batch_size": 129}, "batch_size: expected a whole number from 1 to 128"),
-    (Observe, {"estimator": "pppo"}, r"estimator 'pppo'\. Did you mean 'ppo'"),
     (PPO, {"settings": ["n_steps"]}, "set: expected NAME=VALUE, got 'n_steps'"),
     (SAC, {"learning": ["furthst=1"]}, "Did you mean 'furthest'"),
     (SAC, {"total_timesteps": 2}, "total_timesteps: expected a whole number of at least 20"),

@@ -13,7 +13,6 @@ from baselines.training.methods import METHODS
 from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train, weights_hash
 from baselines.training.validation import validation_seeds
-from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.killing import run_until_done, run_with_kills
 from tests.baselines.training.small import about, play_segments, timeless, tiny, trainer_of
 
@@ -22,7 +21,6 @@ CASES = {
     "apg, damped": tiny("apg", damping=4e-4),
     "apg, skew, end within a segment": tiny("apg", task="skew", steps=20),
     "apg, held for longer than it sees": tiny("apg", offsets=(1, 2)),
-    "observe, ppo": tiny("observe", estimator="ppo"),
     "sac, gSDE": tiny("sac", settings=("learning_starts=40", "buffer_size=200", "use_sde=True")),
 }
 #: Seldom what a method alone has not, and long enough to be killed meanwhile.
@@ -96,8 +94,8 @@ def test_run_json(finished):
 
 def test_the_agent_plays_as_in_validation(finished):
     config, folder, result = finished
-    scenario, name = config.make_scenario(), "recurrent" if config.method == "observe" else "agent"
-    policy = baselines.make(name, scenario, path=str(folder / "agent.safetensors"))
+    scenario = config.make_scenario()
+    policy = baselines.make("agent", scenario, path=str(folder / "agent.safetensors"))
     episodes = rollouts(scenario, policy, validation_seeds(scenario, config.validation_episodes))
     costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
     assert np.exp(np.mean(np.log(costs))) == pytest.approx(result.score.cost, rel=1e-12)
@@ -122,20 +120,3 @@ def test_killed_at_a_random_moment(tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_any_method_may_be_killed_at_random_moments(method, tmp_path):
     check_kills(method, 2, tmp_path, np.random.default_rng())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("estimator", ["analytic", "ppo"])
-def test_observe_learns(estimator):
-    """It learns that measurements are exact or noisy, and that arms change."""
-    sizes = {"hidden": (12,), "n_envs": 16, "plants": 8, "measurements": 8, "gradient_steps": 10, "batch_size": 16}
-    with deterministic_torch():
-        before, *_, after = play_segments(trainer_of(tiny("observe", estimator=estimator, **sizes)), range(4))
-    assert after["train/loss"] < before["train/loss"] - 0.1
-
-
-def test_scenarios_that_observe_refuses():
-    with pytest.raises(InvalidInputError, match=r"task: expected pose, .* got 'skew'"):
-        trainer_of(tiny("observe", task="skew"))
-    with pytest.raises(InvalidInputError, match="reference joint path"):
-        play_segments(trainer_of(tiny("observe", scenario="panda-circle")), [0])

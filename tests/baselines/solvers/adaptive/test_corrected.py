@@ -10,9 +10,9 @@ import ikgym
 from ikgym import Plant
 from tests.baselines.solvers.adaptive.arms import PANDA, noisy, observed, path, perturbed, scenario
 
-NAMES = ["offset_free", "calibrated"]
+NAMES = ["offset_free", "calibrated", "filter_bank"]
 EXACT = {"pose_noise": 1e-6, "pose_rotation_noise": 1e-6}
-SETTLED = {"offset_free": {"gain": 1.0}, "calibrated": EXACT}
+SETTLED = {"offset_free": {"gain": 1.0}, "calibrated": EXACT, "filter_bank": {"noises": (1e-6,)}}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -90,7 +90,7 @@ def true_deviation(arm, zeros, q):
 def test_noise_is_averaged(name):
     """After 100 poses with a noise of 1 mm the deviation is known much better than from one."""
     (arm, zeros), on, rng = perturbed(4), scenario(), np.random.default_rng(5)
-    noise = {} if name == "offset_free" else {"pose_noise": 1e-3, "pose_rotation_noise": 1e-3}
+    noise = {"pose_noise": 1e-3, "pose_rotation_noise": 1e-3} if name == "calibrated" else {}
     policy = baselines.make(name, on, policy="dls", **noise)
     q, state, errors = path(6, 100), None, []
     for k in range(100):
@@ -138,7 +138,7 @@ def tracked(name, late):
 
 
 @pytest.mark.parametrize("late", [False, True])
-@pytest.mark.parametrize("name", ["offset_free", "calibrated"])
+@pytest.mark.parametrize("name", NAMES)
 def test_the_offset_of_a_wrong_arm_is_taken_back(name, late):
     """Of a base policy that only reads joint coordinates, behind a camera that is noisy, slow, late, and has gaps."""
     assert tracked(name, late) < 0.15 * tracked("rhc", late)
