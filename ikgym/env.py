@@ -33,7 +33,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     ## Description
     The tool of an arm is to follow a nominal trajectory that is known some steps ahead. At each step the policy
     chooses the joint velocities, and pays for the tracking error and for high velocities: the stage cost of a
-    receding-horizon controller (Varga 2021). A scenario holds all that defines the problem.
+    receding-horizon controller (Varga 2021). A scenario holds all that defines the problem. For learning there are
+    environments with rewards of size 1: `ikgym/Track-v0` and others, see :mod:`ikgym.rl.ids`.
 
     ## Action space
     | action | space | unit |
