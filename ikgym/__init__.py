@@ -46,3 +46,4 @@ if "RedundantIK-v0" not in gym.registry:
         entry_point="ikgym.env:RedundantIKEnv",
         vector_entry_point="ikgym.vector_env:RedundantIKVectorEnv",
     )
+    rl.ids.register()

@@ -19,6 +19,7 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
+from ikgym.validation import flag
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -32,7 +33,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     ## Description
     The tool of an arm is to follow a nominal trajectory that is known some steps ahead. At each step the policy
     chooses the joint velocities, and pays for the tracking error and for high velocities: the stage cost of a
-    receding-horizon controller (Varga 2021). A scenario holds all that defines the problem.
+    receding-horizon controller (Varga 2021). A scenario holds all that defines the problem. For learning there are
+    environments with rewards of size 1: `ikgym/Track-v0` and others, see :mod:`ikgym.rl.ids`.
 
     ## Action space
     | action | space | unit |
@@ -110,9 +112,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, also given by `spec.max_episode_steps`. Terminated
-    where the position error exceeds `lost_distance`, if there is one. The next reset without other options then enters
-    another episode at the step at which the last one was lost, on its joint path (at its beginning where the reference
-    is a path of the tool alone), so that a policy that still loses its track early also sees the later parts.
+    where the position error exceeds `lost_distance`, if there is one. With `reentry`, the next reset without other
+    options enters another episode at the step at which the last one was lost, on its joint path (at its beginning where
+    the reference is a path of the tool alone), so that a policy that loses its track early also sees the later parts.
 
     Args:
         scenario: A scenario, or its name: a registered one, a file ending in `.toml`, or
@@ -121,6 +123,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which the episode ends; None for never.
+        reentry: Whether the next episode is entered where the last one was lost.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -137,6 +140,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         render_mode: str | None = None,
         commands: int = 0,
         lost_distance: float | None = None,
+        reentry: bool = True,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise InvalidInputError(
@@ -153,7 +157,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
         self.lost_distance = checked_distance(lost_distance)
         self._resumed: int | None = None
-        self._entered = has_joint_path(self.scenario)
+        self._entered = flag("reentry", reentry) and has_joint_path(self.scenario)
         self._has_orientation = self.scenario.task.has_orientation
         self._pictures: Pictures | None = None
         if render_mode is not None:

@@ -14,6 +14,7 @@ from ikgym import rl
 from ikgym.env import OPTIONS, REPORTED
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.options import checked_options
+from ikgym.rl.making import Wrapping
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -222,7 +223,7 @@ class LearningVecEnv(RedundantIKVecEnv):
     Args:
         num_envs: N.
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
-        learning: The parameters of the wrappers.
+        learning: The wrappers and their parameters.
         render_mode: None or `"rgb_array"`.
 
     Raises:
@@ -231,7 +232,7 @@ class LearningVecEnv(RedundantIKVecEnv):
     """
 
     def __init__(
-        self, num_envs: int, scenario: str | Scenario, learning: rl.Learning, render_mode: str | None = None
+        self, num_envs: int, scenario: str | Scenario, learning: Wrapping, render_mode: str | None = None
     ) -> None:
         self.learning = learning
         mode = AutoresetMode.SAME_STEP
@@ -250,17 +251,22 @@ def make_vec(
 
     >>> from stable_baselines3 import PPO
     >>> model = PPO("MlpPolicy", make_vec("panda-random", 8))
+    >>> model = PPO("MlpPolicy", make_vec("ikgym/Track-v0", 8))
 
     Args:
-        scenario: A scenario or its name, see `ikgym.scenarios.find`.
+        scenario: A scenario or its name, see `ikgym.scenarios.find`; or an environment by its id, whose N single ones
+            in a `DummyVecEnv` are the same bit for bit.
         num_envs: N.
         render_mode: None or `"rgb_array"`.
-        changes: Fields of :class:`ikgym.rl.Learning` with other values than the default.
+        changes: Fields of :class:`ikgym.rl.Learning`, for an id of :class:`ikgym.rl.Task`, with other values.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
+    if isinstance(scenario, str) and scenario in rl.IDS:
+        task = rl.IDS[scenario].task.replace(**changes)
+        return LearningVecEnv(num_envs, task.scenario, task, render_mode)
     return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes), render_mode)
 
 

@@ -24,7 +24,7 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import BoolArray, FloatArray, whole_number
+from ikgym.validation import BoolArray, FloatArray, flag, whole_number
 
 
 class _Class(type):
@@ -49,12 +49,11 @@ class RedundantIKVectorEnv(
     | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |
     | `DISABLED` | it must be reset with a mask before the next step, which is an error otherwise |
 
-    `get_attr`, `set_attr` and `call` work for the attributes of single environments, but no row can be stepped or drawn
-    alone.
+    `get_attr`, `set_attr` and `call` work for attributes of single environments; no row is stepped or drawn alone.
 
-    `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is
-    true; `options={"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `options={"arm_seed": …}` keeps
-    arms, and `options={"step": …}` enters episodes after so many steps, one number for all rows or one a row.
+    `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is true;
+    `{"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `{"arm_seed": …}` keeps arms, and
+    `{"step": …}` enters episodes after so many steps, one number for all rows or one a row.
 
     Args:
         num_envs: N.
@@ -66,6 +65,7 @@ class RedundantIKVectorEnv(
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which an episode ends; None for never.
+        reentry: Whether the next episode of a row is entered where its last one was lost.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
@@ -83,6 +83,7 @@ class RedundantIKVectorEnv(
         max_episode_steps: int | None = None,
         commands: int = 0,
         lost_distance: float | None = None,
+        reentry: bool = True,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise InvalidInputError(
@@ -106,7 +107,7 @@ class RedundantIKVectorEnv(
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.lost_distance = checked_distance(lost_distance)
-        self._entered = has_joint_path(self.scenario)
+        self._entered = flag("reentry", reentry) and has_joint_path(self.scenario)
         # Steps at which rows that have lost their track enter their next episode; 0 elsewhere.
         self._resumed = np.zeros(self.num_envs, dtype=np.int64)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs

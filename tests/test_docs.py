@@ -207,6 +207,7 @@ def test_options_of_commands_exist(page):
     for line in lines_for_the_terminal(page):
         words = shlex.split(line, comments=True)[1:]
         which = words[:2] if words[0] == "train" and not words[1].startswith("-") else words[:1]
+        which += words[2:4] if words[2:3] == ["--env"] else []
         options = {word.partition("=")[0] for word in words if word.startswith("--")} - {"--help"}
         assert options <= set(re.findall(r"--[\w-]+", manual_of(*which))), line
 

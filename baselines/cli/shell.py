@@ -32,6 +32,7 @@ EXTRAS = {
     "tensorboard": "train",
     "rich": "train",
     "optuna": "train",
+    "yaml": "train",
     "h5py": "data",
     "minari": "data",
     "pinocchio": "urdf",

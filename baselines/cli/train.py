@@ -12,7 +12,7 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
-from baselines.cli import shell
+from baselines.cli import shell, train_by_id
 from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
 from baselines.training import methods
@@ -91,6 +91,7 @@ Examples:
   {prog} apg --preset standard --seeds 0 1 2 --workers 2 --out runs/apg
   {prog} ppo --total-timesteps 200000 --set n_steps=256 learning_rate=3e-4 --out runs/ppo
   {prog} sac --scenario panda-random --learning furthest=20.0 --out runs/sac
+  {prog} ppo --env ikgym/Track-v0 --out runs/track    (other options, see {prog} ppo --env ID --help)
   {prog} apg --preset quick --out runs/apg --resume
   {prog} repeat runs/apg/seed-0/run.json --out runs/again
 
@@ -116,6 +117,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
+    if any(word.partition("=")[0] == "--env" for word in arguments):
+        return train_by_id.main(arguments)
     out: pathlib.Path | None = None
 
     def work() -> int:

@@ -16,6 +16,7 @@ from baselines.agents.network import Network
 from baselines.agents.relative import Relative
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl import Learning
 from ikgym.sb3 import LearningVecEnv
 from ikgym.scenarios.preview import offsets
 
@@ -73,6 +74,8 @@ def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, 
     Raises:
         InvalidInputError: The model is another, or the environment shows more than agents see.
     """
+    if not isinstance(envs.learning, Learning):
+        raise InvalidInputError("envs: expected arms in the wrappers of ikgym.rl.Learning, got an environment by id.")
     learning, scenario, problem = envs.learning, envs.scenario, Problem.of(envs.scenario)
     modules, squash = _actor(model.policy)
     try:

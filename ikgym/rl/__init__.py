@@ -1,20 +1,38 @@
-"""Wrappers for reinforcement learning, and environments that are wrapped by all of them.
+"""Wrappers for reinforcement learning, environments that are wrapped by them, and those by id.
 
 >>> import ikgym.rl
 >>> envs = ikgym.rl.make_vec("panda-random", num_envs=8)
 """
 
 from ikgym.rl import vector
-from ikgym.rl.making import Learning, make, make_vec
-from ikgym.rl.wrappers import AgentObservation, History, LogReward, RelativeAction
+from ikgym.rl.ids import IDS
+from ikgym.rl.making import Learning, Task, make, make_vec
+from ikgym.rl.scoring import Score, costs, score
+from ikgym.rl.wrappers import (
+    AgentObservation,
+    DistanceReward,
+    History,
+    LogReward,
+    RelativeAction,
+    ShareAction,
+    TrackObservation,
+)
 
 __all__ = [
+    "IDS",
     "AgentObservation",
+    "DistanceReward",
     "History",
     "Learning",
     "LogReward",
     "RelativeAction",
+    "Score",
+    "ShareAction",
+    "Task",
+    "TrackObservation",
+    "costs",
     "make",
     "make_vec",
+    "score",
     "vector",
 ]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
@@ -16,7 +17,43 @@ from ikgym.vector_env import RedundantIKVectorEnv
 
 
 @dataclasses.dataclass(frozen=True)
-class Learning(Frozen):
+class Wrapping(Frozen, abc.ABC):
+    """What all wrapped environments have in common; for the fields see :class:`Learning`."""
+
+    preview: Preview = (1,)
+    lost_distance: float | None = None
+    history: int = 1
+    commands: int = 0
+
+    #: Whether episodes are entered where the last one was lost.
+    reentry: ClassVar[bool]
+
+    def arm(self, scenario: str | Scenario, **options: Any) -> gym.Env[Any, Any]:
+        """One arm of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKEnv`."""
+        env: gym.Env[Any, Any] = self._whole(RedundantIKEnv(scenario, **self._arguments(), **options), wrappers)
+        return env
+
+    def arms(self, scenario: str | Scenario, num_envs: int, **options: Any) -> Any:
+        """N arms of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKVectorEnv`."""
+        return self._whole(RedundantIKVectorEnv(num_envs, scenario, **self._arguments(), **options), vector)
+
+    def _arguments(self) -> dict[str, Any]:
+        """Arguments of the environment."""
+        shown = {"preview": self.preview, "commands": self.commands}
+        return {**shown, "lost_distance": self.lost_distance, "reentry": self.reentry}
+
+    def _whole(self, env: Any, kinds: Any) -> Any:
+        """The environment in all wrappers."""
+        env = self._wrap(env, kinds)
+        return env if self.history == 1 else kinds.History(env, self.history)
+
+    @abc.abstractmethod
+    def _wrap(self, env: Any, kinds: Any) -> Any:
+        """The environment in the wrappers of a module, in their order, up to the features."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Learning(Wrapping):
     """Settings of the wrappers for learning.
 
     The defaults suit PPO of Stable-Baselines3 with its own defaults. With a lead of ten steps, a joint within its
@@ -44,28 +81,47 @@ class Learning(Frozen):
     furthest: float = 5.0
     scale: float = 0.05
     worst: float = 12.0
-    history: int = 1
-    commands: int = 0
 
-    def arm(self, scenario: str | Scenario, **options: Any) -> gym.Env[Any, Any]:
-        """One arm of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKEnv`."""
-        env: gym.Env[Any, Any] = self._wrap(RedundantIKEnv(scenario, **self._arguments(), **options), wrappers)
-        return env
-
-    def arms(self, scenario: str | Scenario, num_envs: int, **options: Any) -> Any:
-        """N arms of a scenario, wrapped; the options are those of :class:`ikgym.RedundantIKVectorEnv`."""
-        return self._wrap(RedundantIKVectorEnv(num_envs, scenario, **self._arguments(), **options), vector)
-
-    def _arguments(self) -> dict[str, Any]:
-        """Arguments of the environment."""
-        return {"preview": self.preview, "commands": self.commands, "lost_distance": self.lost_distance}
+    reentry = True
 
     def _wrap(self, env: Any, kinds: Any) -> Any:
-        """The environment in the wrappers of a module, in their order."""
         env = kinds.RelativeAction(env, self.share, self.largest, self.furthest)
         env = kinds.LogReward(env, self.scale, self.worst)
-        env = kinds.AgentObservation(env, self.furthest)
-        return env if self.history == 1 else kinds.History(env, self.history)
+        return kinds.AgentObservation(env, self.furthest)
+
+
+@dataclasses.dataclass(frozen=True)
+class Task(Wrapping):
+    """The tracking problem and the wrappers of an environment by id, see :mod:`ikgym.rl.ids`.
+
+    Args:
+        scenario: Name of the scenario.
+        preview: Steps ahead at which the reference is shown.
+        lost_distance: Position error in [m] at which an episode ends; None for never.
+        history: Number of observations shown side by side.
+        commands: Number of past commands shown.
+        share: See :class:`ikgym.rl.ShareAction`.
+        radian: Weight of 1 rad in [m], in observation and reward.
+        zero: Distance without reward in [m], also the coarse unit of errors in the observation.
+        fine: Fine unit of errors in the observation, in [m].
+        counted: Steps at the end of an episode whose cost is scored; None for all.
+    """
+
+    scenario: str = "learning-track"
+    preview: Preview = (1, 5)
+    lost_distance: float | None = 0.1
+    share: float = 0.6
+    radian: float = 0.3
+    zero: float = 0.1
+    fine: float = 0.01
+    counted: int | None = None
+
+    reentry = False
+
+    def _wrap(self, env: Any, kinds: Any) -> Any:
+        env = kinds.ShareAction(env, self.share)
+        env = kinds.DistanceReward(env, self.radian, self.zero)
+        return kinds.TrackObservation(env, self.radian, self.zero, self.fine)
 
 
 def make(scenario: str | Scenario, *, render_mode: str | None = None, **changes: Any) -> gym.Env[Any, Any]:

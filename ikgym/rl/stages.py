@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from ikgym.rl.view import FURTHEST, AgentView
 from ikgym.validation import BoolArray, FloatArray, number, shortened, whole_number
 
 Rows = npt.NDArray[np.int64]
+#: Values of `info` by key, for the steps that are rewarded. Shape (N,).
+Told = Callable[[str], FloatArray]
 
 
 class Stage:
@@ -56,8 +58,14 @@ class Stage:
         """The environment's actions. Shapes (N, n)."""
         return actions
 
-    def reward(self, rewards: FloatArray) -> FloatArray:
-        """The rewards of N rows. Shapes (N,)."""
+    def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
+        """The rewards of N rows.
+
+        Args:
+            rewards: From the environment. Shape (N,).
+            told: Costs and errors of the same step.
+        """
+        del told
         return rewards
 
 
@@ -109,8 +117,9 @@ class LogStage(Stage):
         del env
         self._scale, self._worst = number("scale", scale, above=0.0), number("worst", worst, above=0.0)
 
-    def reward(self, rewards: FloatArray) -> FloatArray:
+    def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
         """Rewards scale · max(0, 1 − log(1 + stage cost) / worst)."""
+        del told
         out = np.empty(len(rewards))
         log_rewards(rewards, self._scale, self._worst, out)
         return out

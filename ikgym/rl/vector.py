@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -10,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from ikgym.rl.stages import FeatureStage, HistoryStage, LogStage, Stage, UnitStage, checked_actions
+from ikgym.rl.track import DistanceStage, ShareStage, TrackStage
 from ikgym.scenarios import Scenario
 from ikgym.validation import BoolArray, FloatArray
 
@@ -64,7 +66,8 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
         if self._stage.action_space is not None:
             actions = self._stage.action(checked_actions(actions, self.action_space))
         observation, rewards, terminated, truncated, infos = self.env.step(actions)
-        rewards, ended, begun = self._stage.reward(rewards), terminated | truncated, self._none
+        ended, begun = terminated | truncated, self._none
+        rewards = self._stage.reward(rewards, functools.partial(_told, infos, self.num_envs))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             begun = self._ended
             rewards[begun] = 0.0  # these rows have begun an episode, and taken no step
@@ -98,3 +101,28 @@ class History(ArmsWrapper):
     """:class:`ikgym.rl.History` of N arms: shape (N, length · f)."""
 
     stage = HistoryStage
+
+
+class TrackObservation(ArmsWrapper):
+    """:class:`ikgym.rl.TrackObservation` of N arms: features of shape (N, f)."""
+
+    stage = TrackStage
+
+
+class ShareAction(ArmsWrapper):
+    """:class:`ikgym.rl.ShareAction` of N arms."""
+
+    stage = ShareStage
+
+
+class DistanceReward(ArmsWrapper):
+    """:class:`ikgym.rl.DistanceReward` of N arms."""
+
+    stage = DistanceStage
+
+
+def _told(infos: dict[str, Any], rows: int, key: str) -> FloatArray:
+    """A value of the step just made, also of rows whose next episode has begun since; 0 without a step. Shape (N,)."""
+    found: FloatArray = infos.get(key, np.zeros(rows))
+    final = infos.get("final_info", {}).get(key)
+    return found if final is None else np.where(infos["_final_info"], final, found)

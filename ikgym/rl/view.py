@@ -39,7 +39,7 @@ class AgentView:
     """
 
     def __init__(self, env: Any, furthest: float) -> None:
-        space = _own_space(env)
+        space = own_space(env)
         scenario, preview = env.unwrapped.scenario, env.unwrapped.preview
         if len(preview) < 2:
             raise InvalidInputError(f"preview: expected at least two steps ahead, got {preview}.")
@@ -81,7 +81,7 @@ class AgentView:
         return (-FASTEST * limit, FASTEST * limit) if key == "commands" else (0.0 * limit, limit)
 
 
-def _own_space(env: Any) -> spaces.Dict:
+def own_space(env: Any) -> spaces.Dict:
     """The observation space of one row of an environment of this package."""
     if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
         raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")

@@ -10,6 +10,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from ikgym.kernels.outcome import Observation
 from ikgym.rl.stages import FeatureStage, HistoryStage, LogStage, Stage, UnitStage, checked_actions, one_row
+from ikgym.rl.track import DistanceStage, ShareStage, TrackStage
 from ikgym.rl.view import FURTHEST, Features
 
 FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
@@ -43,7 +44,7 @@ class ArmWrapper(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         if self._stage.action_space is not None:
             action = self._stage.action(checked_actions(action, self.action_space)[None])[0]
         observation, reward, terminated, truncated, info = self.env.step(action)
-        reward = self._stage.reward(np.array([float(reward)]))[0].item()
+        reward = self._stage.reward(np.array([float(reward)]), lambda key: np.array([info[key]]))[0].item()
         return self._seen(observation, LATER), reward, terminated, truncated, info
 
     def _seen(self, observation: Any, begun: Any) -> Any:
@@ -158,3 +159,69 @@ class History(ArmWrapper):
 
     def __init__(self, env: gym.Env[Any, Any], length: int = 4) -> None:
         super().__init__(env, HistoryStage(env, length), length=length)
+
+
+class TrackObservation(ArmWrapper):
+    """The observation for learning without a model: numbers of size 1, at most 5, of shape (f,), float32.
+
+    | size | feature |
+    |---|---|
+    | n | joint coordinates from home, in half of their ranges |
+    | n | joint velocities last applied, as shares of the largest |
+    | 2 w each | position and orientation error to the reference at each step ahead that is shown, in units of \
+`coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
+    | 1 each | ages of `q` and `pose` in units of ten steps, where sensors are slow or late |
+    | h n | the last h commands, as shares of the largest joint velocities, where the environment shows them |
+
+    Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
+    joint 1, as in :class:`AgentObservation`.
+
+    Args:
+        env: The environment, whose observation no other wrapper has changed.
+        radian: Weight of 1 rad in [m], above 0.
+        coarse: In [m], above 0.
+        fine: In [m], above 0.
+
+    Raises:
+        InvalidInputError: A parameter is out of its range, or the arm has no home or a joint without limits.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01) -> None:
+        stage = TrackStage(env, radian, coarse, fine)
+        super().__init__(env, stage, radian=radian, coarse=coarse, fine=fine)
+
+
+class ShareAction(ArmWrapper):
+    """Actions of ±1 as a share of the largest joint velocities, those that arm and scenario allow.
+
+    Args:
+        env: The environment.
+        share: Above 0.
+
+    Raises:
+        InvalidInputError: The share is out of its range.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], share: float = 1.0) -> None:
+        super().__init__(env, ShareStage(env, share), share=share)
+
+
+class DistanceReward(ArmWrapper):
+    """Rewards of size 1 from the true errors and the cost of velocities.
+
+        reward = 1 − log(1 + (d / 1 mm)² + Φ^U) / log(1 + (D / 1 mm)²)
+        d² = (position error)² + (L · orientation error)²
+
+    With L = 1 m, Δx = 1 mm and P_X = 2 this is 1 − log(1 + stage cost) / log(1 + (D / 1 mm)²). It is negative beyond D.
+
+    Args:
+        env: The environment, possibly wrapped.
+        radian: L in [m], at least 0.
+        zero: D in [m], above 0.
+
+    Raises:
+        InvalidInputError: A parameter is out of its range.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, zero: float = 0.1) -> None:
+        super().__init__(env, DistanceStage(env, radian, zero), radian=radian, zero=zero)

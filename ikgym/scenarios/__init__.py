@@ -50,10 +50,11 @@ SPLITS = {
     "validation": range(1_000_000, 2_000_000),
     "test": range(2_000_000, 3_000_000),
 }
-#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, problems of others.
+#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, problems of others, and
+#: those of the environments for learning.
 FILES = {
     family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"), key=lambda file: file.stem)
-    for family in ("papers", "paths", "plants", "published")
+    for family in ("papers", "paths", "plants", "published", "learning")
 }
 
 
@@ -98,10 +99,11 @@ def get(name: str) -> Scenario:
 
 
 def names(family: str | None = None) -> tuple[str, ...]:
-    """The names of all scenarios but :func:`problems_from_elsewhere`, which "all" does not stand for.
+    """The names of all scenarios but those of learning and :func:`problems_from_elsewhere`, which "all" leaves out.
 
     Args:
-        family: Only those of a folder of the catalogue: ``papers``, ``paths``, ``plants`` or ``published``.
+        family: Only those of a folder of the catalogue: ``papers``, ``paths``, ``plants``, ``published`` or
+            ``learning``.
 
     Raises:
         UnknownNameError: There is no such folder.
@@ -190,6 +192,6 @@ def _published(problem: str) -> Scenario:
 
 for _family, _files in FILES.items():
     for _file in _files:
-        _registry.register(_file.stem, functools.partial(load, _file), listed=_family != "published")
+        _registry.register(_file.stem, functools.partial(load, _file), listed=_family not in ("published", "learning"))
 for _name in problems.names("rlitg-random-"):
     _registry.register(_name, functools.partial(_published, _name), listed=False)

@@ -1,0 +1,97 @@
+"""Costs that scores of agents are measured by: ``python -m benchmarks.yardsticks``, in some minutes.
+
+For each environment by id: an arm that stands still; `dls` with the best gain and damping on episodes of the split
+`validation`; and the least cost of an episode that any of some policies reaches, which on a plant are told how the arm
+deviates and have exact sensors without delay.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import baselines
+from baselines.episodes import rollout, rollouts
+from baselines.spec import parse_policy
+from ikgym import rl, scenarios
+from ikgym.rl.scoring import FILE
+from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
+
+EPISODES = 64
+#: Settings of `dls`.
+GAINS, DAMPINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0), (1e-3, 1e-2, 0.03, 0.1)
+#: Policies one of which has the best cost of an episode.
+BEST = ("rhc_foresight", "rhc:horizon=8")
+
+
+class Still:
+    """An arm that stands still."""
+
+    def predict(self, observation: FloatArray, state: Any = None, **_: Any) -> tuple[FloatArray, Any]:
+        """No motion."""
+        return np.zeros((len(observation), 7)), state
+
+
+def counted(scenario: Scenario, policy: str, seeds: Sequence[int], steps: int | None) -> FloatArray:
+    """Logarithms of 1 + cost of the last steps of episodes. Shape (episodes,)."""
+    name, parameters = parse_policy(policy)
+    if name == "told":
+        episodes = [
+            rollout(scenario, baselines.make(name, scenario, seed=seed, **parameters), seed, timed=False)
+            for seed in seeds
+        ]
+    else:
+        episodes = rollouts(scenario, baselines.make(name, scenario, **parameters), seeds)
+    first = 0 if steps is None else scenario.steps - steps
+    return np.log1p([(one.tracking_cost + one.velocity_cost)[first:].sum() for one in episodes])
+
+
+def informed(scenario: Scenario, policy: str) -> tuple[Scenario, str]:
+    """The same plant with exact sensors, and the policy that knows it; as they are where the plant is ideal."""
+    if scenario.plant.ideal:
+        return scenario, policy
+    exact = {"pose_noise": 0.0, "pose_rotation_noise": 0.0, "pose_every": 1, "pose_delay": 0, "pose_missing": 0.0}
+    name, parameters = parse_policy(policy)
+    plant = scenario.plant.replace(**exact)
+    return scenario.replace(plant=plant), f"told:policy={name},options={parameters}"
+
+
+def tuned(scenario: Scenario, steps: int | None) -> str:
+    """`dls` with the best settings on episodes for validation."""
+    seeds = scenarios.seeds("validation", EPISODES)
+    specs = [f"dls:gain={gain},damping={damping}" for gain, damping in itertools.product(GAINS, DAMPINGS)]
+    return min(specs, key=lambda spec: float(counted(scenario, spec, seeds, steps).mean()))
+
+
+def measured(name: str, split: str, dls: str) -> dict[str, float]:
+    """Mean logarithms of 1 + cost of an environment."""
+    task = rl.IDS[name].task
+    scenario, seeds = scenarios.get(task.scenario), scenarios.seeds(split, EPISODES)
+    least = counted(scenario, dls, seeds, task.counted)
+    means = {"still": float(np.log1p(rl.costs(Still(), name, split=split, episodes=EPISODES)).mean())}
+    means["dls"] = float(least.mean())
+    for policy in (dls, *BEST):
+        plant, told = informed(scenario, policy)
+        least = np.minimum(least, counted(plant, told, seeds, task.counted))
+    return {**means, "best": float(least.mean())}
+
+
+def main() -> None:
+    """Measures all of them and writes the file."""
+    out: dict[str, Any] = {"dls_settings": {}, "validation": {}, "test": {}}
+    for name, kind in rl.IDS.items():
+        dls = tuned(scenarios.get(kind.task.scenario), kind.task.counted)
+        out["dls_settings"][name] = dls
+        for split in ("validation", "test"):
+            out[split][name] = measured(name, split, dls)
+            print(name, split, dls, out[split][name], flush=True)
+    FILE.write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

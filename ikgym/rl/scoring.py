@@ -1,0 +1,134 @@
+"""Scores of agents in the environments by id: 0 is an arm that stands still, 1 is tuned damped least squares."""
+
+from __future__ import annotations
+
+import functools
+import json
+import pathlib
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.rl.ids import IDS, TaskEnv
+from ikgym.validation import FloatArray, float_array, known_name, known_names, whole_number
+
+#: Costs of the yardsticks, by split and id; ``python -m benchmarks.yardsticks`` measures them.
+FILE = pathlib.Path(__file__).with_name("yardsticks.json")
+#: Resamples of a bootstrap interval.
+RESAMPLES = 2000
+
+
+class Score(NamedTuple):
+    """The score of an agent in one environment.
+
+    Attributes:
+        mean: Interquartile mean over the training seeds.
+        low: Lower end of the 95 % bootstrap interval over the seeds.
+        high: Its upper end.
+        best: Score of the best known cost.
+    """
+
+    mean: float
+    low: float
+    high: float
+    best: float
+
+
+def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 64) -> FloatArray:
+    """Plays whole episodes, also beyond where training would end them.
+
+    Args:
+        model: Any object with the `predict` of Stable-Baselines3.
+        name: Of the environment, such as ``"ikgym/Track-v0"``.
+        split: Seeds of the episodes, see :data:`ikgym.scenarios.SPLITS`.
+        episodes: Their number.
+
+    Returns:
+        The benchmark's costs: of the last 50 steps of ``"ikgym/Reach-v0"``, else of all. Shape (episodes,).
+
+    Raises:
+        UnknownNameError: There is no such environment or split.
+    """
+    kind = environment(name)
+    known_name("split", split, scenarios.SPLITS)
+    whole_number("episodes", episodes, at_least=1)
+    envs = kind.arms(episodes, autoreset_mode="Disabled", lost_distance=None)
+    observation, _ = envs.reset(seed=scenarios.SPLITS[split].start)
+    steps, state, begun = envs.scenario.steps, None, np.ones(episodes, dtype=np.bool_)
+    first, total = steps - (kind.task.counted or steps), np.zeros(episodes)
+    for step in range(steps):
+        action, state = model.predict(observation, state=state, episode_start=begun, deterministic=True)
+        observation, *_, infos = envs.step(action)
+        begun[:] = False
+        if step >= first:
+            total += infos["tracking_cost"] + infos["velocity_cost"]
+    return total
+
+
+def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str, Score]:
+    """Scores of agents, linear in the logarithm of 1 + cost.
+
+    >>> ikgym.rl.score({"ikgym/Track-v0": [ikgym.rl.costs(model, "ikgym/Track-v0", split="test") for model in models]})
+
+    Args:
+        results: Costs of :func:`costs` by id, one row a training seed. Shape (seeds, episodes).
+        split: Of their episodes.
+
+    Raises:
+        UnknownNameError: There is no such environment or split.
+        InvalidInputError: Costs are not of that shape, not finite or below 0.
+    """
+    known_names("environment", results, IDS)
+    return {name: _score(name, value, yardsticks(split)[name]) for name, value in results.items()}
+
+
+def environment(name: str) -> type[TaskEnv]:
+    """The class of an id.
+
+    Raises:
+        UnknownNameError: There is no such environment.
+    """
+    known_name("environment", name, IDS)
+    return IDS[name]
+
+
+def yardsticks(split: str) -> dict[str, dict[str, float]]:
+    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`.
+
+    Raises:
+        UnknownNameError: They are not known for that split.
+    """
+    known_name("split", split, _yardsticks())
+    found: dict[str, dict[str, float]] = _yardsticks()[split]
+    return found
+
+
+def interquartile_mean(values: FloatArray) -> FloatArray:
+    """The mean without the lowest and the highest quarter of the last axis. Shapes (..., k), (...)."""
+    cut = values.shape[-1] // 4
+    kept: FloatArray = np.sort(values, axis=-1)[..., cut : values.shape[-1] - cut].mean(axis=-1)
+    return kept
+
+
+def _score(name: str, value: npt.ArrayLike, yardstick: Mapping[str, float]) -> Score:
+    cost = float_array(name, value)
+    if cost.ndim != 2 or 0 in cost.shape or (cost < 0.0).any():
+        raise InvalidInputError(f"{name}: expected costs of at least 0 of shape (seeds, episodes), got {cost.shape}.")
+
+    def scored(logarithm: Any) -> Any:
+        return (yardstick["still"] - logarithm) / (yardstick["still"] - yardstick["dls"])
+
+    seeds = scored(np.log1p(cost).mean(axis=1))
+    drawn = np.random.default_rng(0).choice(seeds, (RESAMPLES, len(seeds)))
+    low, high = np.quantile(interquartile_mean(drawn), [0.025, 0.975]).tolist()
+    return Score(float(interquartile_mean(seeds)), low, high, scored(yardstick["best"]))
+
+
+@functools.cache
+def _yardsticks() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return content

@@ -1,0 +1,67 @@
+"""Kernels of the environments by id: what an agent sees of one arm, and its reward."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ikgym.kernels.jit import kernel
+from ikgym.rl.twists import is_turned, turn, twist, twist_size
+
+#: Bound of the features.
+MOST = 5.0
+
+
+@kernel
+def track_rows(kind, chain, scales, home, half, fastest, q, qdot, pose, nominal, out):
+    """The features row by row, see :class:`ikgym.rl.TrackObservation`.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm's model, see :class:`ikgym.kernels.kinematics.Chain`.
+        scales: Weight of 1 rad in [m], and the coarse and the fine unit of distances in [m].
+        home: Posture in [rad] or [m] from which joints are seen. Shape (n,).
+        half: Half of the range of each joint in [rad] or [m]. Shape (n,).
+        fastest: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
+        q: Shape (N, n).
+        qdot: Shape (N, n).
+        pose: Shape (N, m).
+        nominal: Shape (N, p, m).
+        out: Receives the features. Shape (N, 2 n + 2 p w).
+    """
+    radian, coarse, fine = scales
+    n, w, turned = q.shape[1], twist_size(kind), is_turned(kind, chain.prismatic)
+    error, missing = np.empty(6), np.empty(w)
+    for row in range(q.shape[0]):
+        for j in range(n):
+            out[row, j] = min(max((q[row, j] - home[j]) / half[j], -MOST), MOST)
+            out[row, n + j] = min(max(qdot[row, j] / fastest[j], -MOST), MOST)
+        at = 2 * n
+        for i in range(nominal.shape[1]):
+            twist(kind, nominal[row, i], pose[row], error, missing)
+            if turned:
+                turn(chain.axes[0], -q[row, 0], missing)
+            for a in range(w):
+                distance = missing[a] if a < 3 else radian * missing[a]
+                out[row, at + a] = min(max(distance / coarse, -MOST), MOST)
+                out[row, at + w + a] = math.tanh(distance / fine)
+            at += 2 * w
+
+
+@kernel
+def distance_rewards(scales, position, orientation, velocity_cost, out):
+    """Rewards of N rows, see :class:`ikgym.rl.DistanceReward`.
+
+    Args:
+        scales: Weight of 1 rad in [m], unit of distances and distance without reward in [m].
+        position: Position errors in [m]. Shape (N,).
+        orientation: Orientation errors in [rad]. Shape (N,).
+        velocity_cost: Φ^U. Shape (N,).
+        out: Receives the rewards. Shape (N,).
+    """
+    radian, unit, zero = scales
+    most = math.log1p((zero / unit) ** 2)
+    for row in range(out.shape[0]):
+        square = (position[row] / unit) ** 2 + (radian * orientation[row] / unit) ** 2
+        out[row] = 1.0 - math.log1p(square + velocity_cost[row]) / most

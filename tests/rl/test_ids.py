@@ -1,0 +1,212 @@
+"""The environments by id: one table of checks over all of them."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import pickle
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
+from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
+from stable_baselines3.common.env_util import make_vec_env
+
+import ikgym
+import ikgym.sb3
+from baselines.episodes import play
+from ikgym.exceptions import IkgymError
+from ikgym.rl import IDS
+from tests.rl.test_wrappers import played, same_bits
+
+N = 3
+SIZES = {"Reach": 26, "Track": 38, "Fast": 38, "Limits": 38, "Camera": 272, "Payload": 272}
+
+every_id = pytest.mark.parametrize("name", IDS)
+
+
+def actions_of(env, steps, seed=0):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, *env.action_space.shape)).astype(np.float32)
+
+
+def told(env, actions, seed=None):
+    """All that an environment returns, up to the end of the episode."""
+    out = [env.reset(seed=seed)[0]]
+    for action in actions:
+        observation, reward, terminated, truncated, _ = env.step(action)
+        out += [observation, reward]
+        if terminated or truncated:
+            return [*out, terminated, truncated]
+    return out
+
+
+@every_id
+def test_both_checkers_accept_it_without_a_warning(name):
+    env = gym.make(name, render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+        check_env_of_sb3(env)
+
+
+@every_id
+def test_spaces_and_specification(name):
+    env = gym.make(name)
+    size = SIZES[name.removeprefix("ikgym/").removesuffix("-v0")]
+    assert env.observation_space.shape == (size,)
+    assert env.observation_space.dtype == np.float32
+    assert env.action_space == gym.spaces.Box(-1.0, 1.0, (7,), np.float32)
+    assert env.spec.max_episode_steps == env.unwrapped.scenario.steps
+    assert 100 <= env.spec.max_episode_steps <= 400
+    assert 0.0 < env.spec.reward_threshold < env.spec.max_episode_steps
+    assert env.metadata["render_fps"] == round(1.0 / env.unwrapped.scenario.dt)
+    assert f"`Box(-5.0, 5.0, ({size},), float32)`" in type(env.unwrapped).__doc__
+
+
+@every_id
+def test_made_again_from_its_specification_it_is_wrapped_once(name):
+    env = gym.make(name)
+    again = gym.make(env.spec)
+    actions = actions_of(env, 20)
+    assert same_bits(told(env, actions, 4), told(again, actions, 4))
+    assert type(again.unwrapped) is type(env.unwrapped)
+    assert str(again) == str(env)
+
+
+@every_id
+def test_seeds(name):
+    env = gym.make(name)
+    actions = actions_of(env, 5)
+    before = np.random.get_state()[1].copy()  # noqa: NPY002  # that it is left alone
+    first, other, same, unseeded = (told(env, actions, seed) for seed in (7, 8, 7, None))
+    assert same_bits(first, same)
+    assert not same_bits(first, other)
+    assert not same_bits(first, unseeded)
+    assert (np.random.get_state()[1] == before).all()  # noqa: NPY002
+    assert env.unwrapped.np_random_seed == 7
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+@every_id
+def test_native_vector_is_sync_of_singles_bit_for_bit(name, mode):
+    native = gym.make_vec(name, N, autoreset_mode=mode)
+    sync = gym.make_vec(name, N, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode})
+    assert native.single_observation_space == sync.single_observation_space
+    assert native.single_action_space == sync.single_action_space
+    ended = 0
+    steps = native.spec.max_episode_steps + 5
+    for ours, theirs in itertools.zip_longest(
+        played(native, actions_of(native, steps)), played(sync, actions_of(sync, steps))
+    ):
+        assert same_bits(ours, theirs)
+        if isinstance(ours, tuple):
+            assert native.single_observation_space.contains(ours[0][0])
+            ended += (ours[2] | ours[3]).sum()
+    assert ended >= N
+
+
+@every_id
+def test_arms_of_stable_baselines3_are_dummy_ones_bit_for_bit(name):
+    ours, theirs = ikgym.sb3.make_vec(name, 2), make_vec_env(name, 2)
+    for envs in (ours, theirs):
+        envs.seed(3)
+    assert same_bits(ours.reset(), theirs.reset())
+    ends = 0
+    for actions in actions_of(gym.make_vec(name, 2), ours.scenario.steps + 3):
+        (seen, rewards, ended, infos), (*others, other_infos) = ours.step(actions), theirs.step(actions)
+        assert same_bits((seen, rewards, ended), others)
+        for row in np.flatnonzero(ended):
+            ends += 1
+            assert same_bits(infos[row]["terminal_observation"], other_infos[row]["terminal_observation"])
+            assert infos[row]["TimeLimit.truncated"] == other_infos[row]["TimeLimit.truncated"]
+            assert infos[row]["episode"]["r"] == pytest.approx(other_infos[row]["episode"]["r"], abs=1e-5)
+    assert ends >= 2
+
+
+@every_id
+def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
+    env = gym.make(name)
+    task, scenario = env.unwrapped.task, env.unwrapped.scenario
+    actions = actions_of(env, 30) * 0.2
+    env.reset(seed=11)
+    infos = [env.step(action)[-1] for action in actions]
+    fractions = iter(actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit))
+    outcomes = play(scenario, [11], lambda _: next(fractions)[None], preview=task.preview, commands=task.commands)
+    for info, out in zip(infos, outcomes, strict=False):
+        assert info["tracking_cost"] == out.tracking_cost[0]
+        assert info["velocity_cost"] == out.velocity_cost[0]
+
+
+@every_id
+def test_rewards_are_what_the_class_says(name):
+    env = gym.make(name)
+    task = env.unwrapped.task
+    env.reset(seed=0)
+    for action in actions_of(env, 10):
+        _, reward, _, _, info = env.step(action)
+        square = info["position_error"] ** 2 + (task.radian * info["orientation_error"]) ** 2
+        lost = np.log1p(1e6 * square + info["velocity_cost"]) / np.log1p(1e6 * task.zero**2)
+        assert reward == pytest.approx(1.0 - lost, rel=1e-12)
+
+
+@every_id
+def test_an_episode_begins_at_its_first_step_also_after_a_lost_one(name):
+    env, most = gym.make(name, lost_distance=0.02), np.ones(7, dtype=np.float32)
+    env.reset(seed=0)
+    for _ in range(3):
+        _, _, lost, _, info = env.step(most)
+        assert info["time"] == env.unwrapped.scenario.dt
+        while not lost:
+            lost = env.step(most)[2]
+        env.reset()
+
+
+@every_id
+def test_pickled_in_mid_episode_it_goes_on_as_before(name):
+    env = gym.make(name)
+    env.reset(seed=2)
+    actions = actions_of(env, 6)
+    env.step(actions[0])
+    again = pickle.loads(pickle.dumps(env))
+    for action in actions[1:]:
+        assert same_bits(env.step(action)[:4], again.step(action)[:4])
+    assert same_bits(env.reset()[0], again.reset()[0])
+
+
+def test_wrappers_of_gymnasium(tmp_path):
+    pytest.importorskip("moviepy")
+    env = RecordEpisodeStatistics(TimeLimit(gym.make("ikgym/Track-v0", render_mode="rgb_array"), 4))
+    videos = {"episode_trigger": lambda _: True, "disable_logger": True}
+    env = NormalizeObservation(RecordVideo(env, str(tmp_path / "videos"), **videos))
+    env.reset(seed=0)
+    rewards = []
+    for action in actions_of(env, 4):
+        seen, reward, terminated, truncated, info = env.step(action)
+        rewards.append(reward)
+    assert truncated
+    assert not terminated
+    assert info["episode"]["r"] == pytest.approx(sum(rewards))
+    assert seen.shape == (SIZES["Track"],)
+    assert np.abs(seen).max() < 10.0
+    env.close()
+    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
+
+
+def test_fields_of_the_task_can_be_changed():
+    env = gym.make("ikgym/Track-v0", lost_distance=None, history=2)
+    assert env.observation_space.shape == (2 * SIZES["Track"],)
+    assert gym.make(env.spec).observation_space == env.observation_space
+    assert gym.make_vec("ikgym/Track-v0", 2, history=2).single_observation_space == env.observation_space
+    with pytest.raises(IkgymError, match="Did you mean 'history'"):
+        gym.make("ikgym/Track-v0", histroy=2)
+
+
+def test_importing_again_registers_nothing_twice():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        importlib.reload(ikgym)
+    assert set(IDS) <= set(gym.registry)

@@ -1,0 +1,80 @@
+"""Scores of agents: the yardsticks, the mean over seeds, and what is played."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.episodes import play, rollouts
+from benchmarks.yardsticks import Still, counted
+from ikgym import rl, scenarios
+from ikgym.exceptions import IkgymError
+from ikgym.rl.scoring import interquartile_mean, yardsticks
+
+TRACK = "ikgym/Track-v0"
+
+
+def cost_of(score, name=TRACK, split="test"):
+    """A cost with a score, by the definition."""
+    own = yardsticks(split)[name]
+    return np.expm1(own["still"] + score * (own["dls"] - own["still"]))
+
+
+def test_it_is_linear_in_the_logarithm_and_may_exceed_1():
+    for wanted in (0.0, 0.4, 1.0, 1.2):
+        found = rl.score({TRACK: np.full((5, 3), cost_of(wanted))})[TRACK]
+        assert found[:3] == pytest.approx((wanted, wanted, wanted))
+    assert rl.score({TRACK: [[np.expm1(yardsticks("test")[TRACK]["best"])]]})[TRACK].mean == pytest.approx(found.best)
+
+
+def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
+    assert interquartile_mean(np.array([[9.0, 1.0, 2.0, 3.0, -7.0], [0.0, 0.0, 0.0, 0.0, 5.0]])).tolist() == [2.0, 0.0]
+    costs = [[cost_of(score)] * 4 for score in (0.1, 0.2, 0.3, 0.4, 0.9)]
+    found = rl.score({TRACK: costs})[TRACK]
+    assert found.mean == pytest.approx(0.3)
+    assert 0.1 <= found.low < 0.3 < found.high <= 0.9
+    assert rl.score({TRACK: costs})[TRACK] == found
+
+
+@pytest.mark.parametrize("name", rl.IDS)
+def test_yardsticks_stand_in_their_order(name):
+    for split in ("validation", "test"):
+        own = yardsticks(split)[name]
+        assert own["best"] < own["dls"] < own["still"]
+
+
+@pytest.mark.parametrize("name", [TRACK, "ikgym/Reach-v0"])
+def test_an_arm_that_stands_still_costs_what_the_benchmark_says(name):
+    task = rl.IDS[name].task
+    scenario, seeds = scenarios.get(task.scenario), scenarios.seeds("validation", 2)
+    steps = [out.tracking_cost for out in play(scenario, seeds, lambda _: np.zeros((2, 7)), preview=1)]
+    costs = np.sum(steps[-(task.counted or 0) :], axis=0)
+    found = rl.costs(Still(), name, episodes=2)
+    assert found == pytest.approx(costs, rel=1e-12)
+    assert rl.score({name: [found]}, "validation")[name].mean == pytest.approx(0.0, abs=0.2)
+
+
+def test_settings_of_yardsticks_play_the_same_steps():
+    scenario, seeds = scenarios.get("learning-reach"), scenarios.seeds("validation", 2)
+    episodes = rollouts(scenario, baselines.make("dls", scenario, gain=0.3), seeds)
+    costs = [(one.tracking_cost + one.velocity_cost)[50:].sum() for one in episodes]
+    assert counted(scenario, "dls:gain=0.3", seeds, 50) == pytest.approx(np.log1p(costs), rel=1e-12)
+
+
+@pytest.mark.parametrize(("results", "message"), [
+    ({"ikgym/Trak-v0": [[1.0]]}, "ikgym/Track-v0"),
+    ({TRACK: [1.0, 2.0]}, r"of shape \(seeds, episodes\), got \(2,\)"),
+    ({TRACK: [[-1.0]]}, "at least 0"),
+])  # fmt: skip
+def test_wrong_results_are_refused(results, message):
+    with pytest.raises(IkgymError, match=message):
+        rl.score(results)
+
+
+def test_wrong_names_are_refused():
+    with pytest.raises(IkgymError, match="validation"):
+        rl.score({TRACK: [[1.0]]}, "train")
+    with pytest.raises(IkgymError, match="Did you mean"):
+        ikgym.rl.costs(Still(), "ikgym/Reach-v1")
