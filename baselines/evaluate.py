@@ -13,6 +13,6 @@ from baselines.evaluation.run import evaluate
 __all__ = ["evaluate"]
 
 if __name__ == "__main__":
-    from baselines.cli.evaluate import main
+    from baselines.cli.commands.evaluate import main
 
     raise SystemExit(main())

@@ -14,8 +14,8 @@ import numpy as np
 
 import baselines
 import ikgym
-from baselines.cli.arms import kinds_of_limits
-from baselines.cli.policies import summary
+from baselines.cli.commands.arms import kinds_of_limits
+from baselines.cli.commands.policies import summary
 from baselines.evaluation import test_sets as sets
 from baselines.evaluation.records import from_csv
 from baselines.evaluation.records import markdown as results_table

@@ -9,23 +9,23 @@ from collections.abc import Callable, Sequence
 from baselines.cli import shell
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
-#: A summary of each command, and the module with its function ``main``.
+#: A summary of each command; its module in :mod:`baselines.cli.commands` has its name, and a function ``main``.
 COMMANDS = {
-    "evaluate": ("play policies on scenarios: table, files and plots", "baselines.cli.evaluate"),
-    "path": ("say whether a path can be driven, from which start, how fast", "baselines.cli.path"),
-    "compare": ("recommend a solver for an arm and a path", "baselines.cli.compare"),
-    "train": ("train an agent", "baselines.cli.train"),
-    "tune": ("search settings of solvers", "baselines.cli.tune"),
-    "dataset": ("write episodes as a Minari data set", "baselines.cli.dataset"),
-    "reproduce": ("draw the figures of the papers again, and test their claims", "baselines.cli.reproduce"),
-    "leaderboard": ("compare policies on test sets in one table with intervals", "baselines.cli.leaderboard"),
-    "robustness": ("map the cost of policies over severities of an imperfect plant", "baselines.cli.robustness"),
-    "view": ("show policies side by side in a browser, live and in an episode", "baselines.cli.view"),
-    "video": ("write an episode as a video", "baselines.cli.video"),
-    "oracle": ("search best known costs", "baselines.cli.oracle"),
-    "arms": ("list the arms, or show some", "baselines.cli.arms"),
-    "scenarios": ("list the scenarios, or show some", "baselines.cli.scenarios"),
-    "policies": ("list the policies, or show some with their parameters", "baselines.cli.policies"),
+    "evaluate": "play policies on scenarios: table, files and plots",
+    "path": "say whether a path can be driven, from which start, how fast",
+    "compare": "recommend a solver for an arm and a path",
+    "train": "train an agent",
+    "tune": "search settings of solvers",
+    "dataset": "write episodes as a Minari data set",
+    "reproduce": "draw the figures of the papers again, and test their claims",
+    "leaderboard": "compare policies on test sets in one table with intervals",
+    "robustness": "map the cost of policies over severities of an imperfect plant",
+    "view": "show policies side by side in a browser, live and in an episode",
+    "video": "write an episode as a video",
+    "oracle": "search best known costs",
+    "arms": "list the arms, or show some",
+    "scenarios": "list the scenarios, or show some",
+    "policies": "list the policies, or show some with their parameters",
 }
 
 
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def manual() -> str:
     """The text of ``--help``."""
-    lines = "\n".join(f"  {name:12} {summary}" for name, (summary, _) in COMMANDS.items())
+    lines = "\n".join(f"  {name:12} {summary}" for name, summary in COMMANDS.items())
     return f"""\
 usage: {shell.CONSOLE} COMMAND …
 
@@ -66,7 +66,7 @@ def _command(word: str) -> Callable[[Sequence[str]], int]:
         return lambda others: _print_about(word, others)
     if word not in COMMANDS:
         raise UnknownNameError("command", word, COMMANDS)
-    function: Callable[[Sequence[str]], int] = importlib.import_module(COMMANDS[word][1]).main
+    function: Callable[[Sequence[str]], int] = importlib.import_module(f"baselines.cli.commands.{word}").main
     return function
 
 

@@ -18,9 +18,9 @@ import ikgym
 from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
 from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
-from baselines.evaluation.free_timing import play_to_end
 from baselines.evaluation.jobs import Job
 from baselines.evaluation.metrics import Row, describe, measure
+from baselines.evaluation.motion.free_timing import play_to_end
 from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known

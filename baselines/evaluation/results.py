@@ -16,9 +16,9 @@ import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
-from baselines.evaluation.free_timing import as_long
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
+from baselines.evaluation.motion.free_timing import as_long
 from baselines.files import (
     ResultsError,
     check_flags,

@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
-from baselines.evaluation.free_timing import as_long
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
+from baselines.evaluation.motion.free_timing import as_long
 from baselines.evaluation.motion.played import by_joint
 from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture

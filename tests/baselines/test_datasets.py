@@ -14,7 +14,7 @@ pytest.importorskip("minari", reason='needs Minari: pip install "ikgym[data]"')
 import minari
 
 from baselines import datasets
-from baselines.cli.dataset import main
+from baselines.cli.commands.dataset import main
 from baselines.datasets import write
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError

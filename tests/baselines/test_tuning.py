@@ -14,7 +14,7 @@ pytest.importorskip("optuna", reason='needs Optuna: pip install "ikgym[train]"')
 import optuna
 
 from baselines import registry, tuning
-from baselines.cli.tune import main
+from baselines.cli.commands.tune import main
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from baselines.tuning import JOURNAL, RANGES, Search

@@ -240,7 +240,8 @@ def test_a_command_imports_what_the_command_line_names():
     solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}
     assert {"quadratic_program"} <= solvers <= {"quadratic_program", "resolved_rate", "arm_task", "linear_algebra"}
     assert {name for name in modules if name.startswith("baselines.cli.")} == {
-        "baselines.cli.evaluate",
+        "baselines.cli.commands",
+        "baselines.cli.commands.evaluate",
         "baselines.cli.parsing",
         "baselines.cli.shell",
     }

@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from baselines.cli import leaderboard, robustness
+from baselines.cli.commands import leaderboard, robustness
 from ikgym.exceptions import InvalidInputError
 
 

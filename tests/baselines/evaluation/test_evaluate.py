@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.cli.evaluate import main
+from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
 from baselines.evaluation import run as module
 from baselines.evaluation.jobs import Options

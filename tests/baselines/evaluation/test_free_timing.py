@@ -10,7 +10,7 @@ import ikgym
 from baselines.episodes import Seeds, add_up, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.free_timing import reference_at
+from baselines.evaluation.motion.free_timing import reference_at
 from baselines.evaluation.motion.stop import FEWEST
 from baselines.evaluation.records import records
 from tests.baselines.solvers.quadratic_program.paths import circle

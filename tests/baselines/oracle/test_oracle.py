@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import baselines
 import ikgym
-from baselines.cli import oracle as optimum_command
+from baselines.cli.commands import oracle as optimum_command
 from baselines.episodes import rollout
 from baselines.evaluation import test_sets
 from baselines.fingerprints import episode_hash

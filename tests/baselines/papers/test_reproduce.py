@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from baselines.cli.reproduce import main, reproduce
+from baselines.cli.commands.reproduce import main, reproduce
 from baselines.papers import PAPERS, ledger
 from baselines.papers.paper import Finding
 from baselines.papers.runs import Runs

@@ -12,7 +12,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.noise import NormalActionNoise
 
-from baselines.cli.train import main
+from baselines.cli.commands.train import main
 from baselines.training.by_id import Training
 from baselines.training.trainers.sb3 import ALGORITHMS
 from ikgym.exceptions import IkgymError

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from baselines.cli import train
-from baselines.cli.train import main, parse
+from baselines.cli.commands import train
+from baselines.cli.commands.train import main, parse
 from baselines.files import ResultsError
 from baselines.training import run, seeds
 from baselines.training.config import APG, PPO
@@ -161,7 +161,7 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
 def test_the_command_line_is_read_without_torch():
     """PyTorch takes seconds to load, and is an extra."""
     code = (
-        "import sys; from baselines.cli.train import parse\n"
+        "import sys; from baselines.cli.commands.train import parse\n"
         "parse(['sac', '--preset', 'smoke', '--out', 'x']); assert 'torch' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)

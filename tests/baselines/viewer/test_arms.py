@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.cli.view import meshes
+from baselines.cli.commands.view import meshes
 from baselines.viewer.readings import AT, FREE, NEAR, Reader, slider_range
 from baselines.viewer.replay import size
 from ikgym.exceptions import InvalidInputError

@@ -11,7 +11,8 @@ import urllib.request
 import numpy as np
 import pytest
 
-from baselines.cli import main, view
+from baselines.cli import main
+from baselines.cli.commands import view
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Mode, Session
 

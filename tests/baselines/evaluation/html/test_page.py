@@ -8,7 +8,7 @@ import re
 
 import pytest
 
-from baselines.cli.evaluate import main
+from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
 from baselines.evaluation.html import page
 from baselines.evaluation.html.page import COLUMNS, embedded

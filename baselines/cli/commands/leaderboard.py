@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.evaluate import RULES, Arguments
+from baselines.cli.commands.evaluate import RULES, Arguments
 from baselines.evaluation import records
 from baselines.evaluation.results import Rows, slug
 from baselines.evaluation.run import carry_out

@@ -12,7 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.evaluate import ONE_KIND
+from baselines.cli.commands.evaluate import ONE_KIND
 from baselines.cli.parsing import if_random
 from baselines.episodes import Seeds
 from baselines.evaluation import records

@@ -1,6 +1,6 @@
 """Regenerates the papers' experiments as figures and numbers, and the ledger of their claims.
 
->>> from baselines.cli.reproduce import reproduce
+>>> from baselines.cli.commands.reproduce import reproduce
 >>> findings = reproduce(["zhang"])
 """
 

@@ -1,0 +1,1 @@
+"""The commands of ``ikgym``, one module each."""
