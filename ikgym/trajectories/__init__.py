@@ -7,9 +7,8 @@ one of them, and gives a fixed trajectory back as it is.
 from __future__ import annotations
 
 from ikgym.trajectories import paths
-from ikgym.trajectories.batch import first_joints_of, frames_of, joint_paths_of
+from ikgym.trajectories.batch import JointMotions, first_joints_of, frames_of, joint_paths_of
 from ikgym.trajectories.helix import Helix
-from ikgym.trajectories.joint_motions import JointMotions
 from ikgym.trajectories.joint_spline import JointSpline
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory

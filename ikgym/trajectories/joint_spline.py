@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.joint_motions import JointMotions, paths_of
+from ikgym.trajectories.batch import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
 
