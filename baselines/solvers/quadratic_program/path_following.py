@@ -91,15 +91,8 @@ def path_step(model, numbers, seen, memory, answer):
         if program.braking_share > 0.0:
             missing *= feedback_share(hessian, jac, missing, program.braking_share * limits[CHANGE])
         least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
-        aim = speed
-        for _ in range(SOLVES):
-            length = goal_along_path(jac, motion, missing, SCALING_WEIGHT * weight, preferred, aim, hessian, linear)
-            lower[n], upper[n] = least * length, length
-            answer.iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
-            made = min(max(x[n] / length, least), 1.0) if length > 0.0 else min(max(speed, least), 1.0)
-            if made > 0.999 * min(speed, 1.0):
-                break
-            aim = made
+        goals = SCALING_WEIGHT * weight, preferred, speed, least
+        made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)
         memory.steps[row], memory.progress[row], memory.speed[row] = steps + 1, progress + made, made
         for j in range(n):
             answer.qdot[row, j] = x[j]
@@ -108,6 +101,35 @@ def path_step(model, numbers, seen, memory, answer):
         held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper)
         stuck = made <= max(least, STUCK) < speed
         answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
+
+
+@inner
+def _minimum(jacobian, motion, error, goals, program, x):
+    """Joint velocities and progress.
+
+    Args:
+        jacobian: J Δt. Shape (e, n).
+        motion: Motion of the reference in one step. Shape (e,).
+        error: The share of the error that is taken back. Shape (e,).
+        goals: Weight of the joint motion, preferred joint velocities, the speed to aim at, and the least one.
+        program: H with the curvature of the joints, g, lower and upper bounds, those of the joints set.
+        x: Receives the joint velocities; the last element is the variable of the progress. Shape (n + 1,).
+
+    Returns:
+        The progress in steps of the reference, the number of solves, and whether the optimum was found.
+    """
+    (weight, preferred, speed, least), (hessian, linear, lower, upper), n = goals, program, x.shape[0] - 1
+    aim, made, iterations, found = speed, least, 0, False
+    for _ in range(SOLVES):
+        length = goal_along_path(jacobian, motion, error, weight, preferred, aim, hessian, linear)
+        lower[n], upper[n] = least * length, length
+        solves, found = box_minimum(hessian, linear, lower, upper, x)
+        iterations += solves
+        made = min(max(x[n] / length if length > 0.0 else speed, least), 1.0)
+        if made > 0.999 * min(speed, 1.0):
+            break
+        aim = made
+    return made, iterations, found
 
 
 @inlined
