@@ -152,15 +152,24 @@ def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypat
         evaluate(named(), "dls", out=tmp_path / "out", export="mcap")
 
 
+class Rushing:
+    """Drives the first joint as fast as it goes."""
+
+    preview = 1
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return np.eye(7, dtype=np.float32)[0], None
+
+
 def test_a_motion_without_room_to_stop_is_named_and_the_others_are_written(tmp_path):
-    scenario = circle(dt=2e-3)
-    shoulder = np.array([0.0, 1.7627, 0.0, -1.57, 0.0, 1.57, 0.0])
-    lost = scenario.replace(name="lost", start=shoulder, steps=5)
-    rows = evaluate([scenario.replace(steps=5), lost], "dls", out=tmp_path, export="joint-trajectory")
-    assert len(rows) == 2
-    names = {skipped.scenario: skipped.reason for skipped in rows.skipped}
-    assert names.keys() <= {"lost"}
-    assert len(files(tmp_path)) == 2 - len(names)
+    scenario = circle(dt=2e-3).replace(steps=20)
+    close = scenario.start + np.eye(7)[0] * (scenario.arm.upper[0] - 0.02 - scenario.start[0])
+    rows = evaluate([scenario, scenario.replace(name="close", start=close)], Rushing(), out=tmp_path, export="mcap")
+    (skipped,) = rows.skipped
+    assert (len(rows), skipped.scenario, skipped.policy) == (2, "close", "Rushing")
+    assert "no .mcap of seed 0: expected a run that ends at rest" in skipped.reason
+    assert "joint 'panda_joint1' moves at 0.6 rad/s at the end" in skipped.reason
+    assert [name.partition("/")[0] for name in files(tmp_path)] == ["circle-pose"]
 
 
 def test_every_episode_in_every_format(tmp_path):
