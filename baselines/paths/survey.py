@@ -28,8 +28,9 @@ SETTLED = 0.3
 #: Steps of such a play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
 FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: Timings that take no more than so many times what is asked count as the same. Joints nearer to a stop than the first
-#: of these rooms, in [rad] or [m], are braked by it; more than the second is no better.
-SLOWING, NARROW, ENOUGH = 1.02, 0.02, 0.3
+#: of these rooms, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
+#: with more than the last share of a velocity limit, where accelerations are not limited.
+SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.3, 0.1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,6 +46,7 @@ class Branch:
         orientation_error: The largest in [rad]; 0 where the task has no orientation.
         velocity: The largest joint velocities, were this motion as fast as asked, in [rad/s] or [m/s]. Shape (n,).
         acceleration: The same of accelerations, in [rad/s²] or [m/s²]. Shape (n,).
+        leap: The largest share of a velocity limit in the first control period, from rest.
         room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
         shortest: The shortest timing of this motion in which all limits hold; None if poses are missed.
         asked: The same, nowhere faster than asked.
@@ -58,6 +60,7 @@ class Branch:
     orientation_error: float
     velocity: FloatArray
     acceleration: FloatArray
+    leap: float
     room: FloatArray
     shortest: Timing | None
     asked: Timing | None
@@ -74,7 +77,14 @@ class Branch:
         slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
         room = float(self.room.min())
         enough = min(round(room, 1), ENOUGH)
-        return -2.0, room < NARROW, round(slowing, 2), not self.given, -enough, self.shortest.duration
+        return (
+            -2.0,
+            room < NARROW or self.leap > LEAP,
+            round(slowing, 2),
+            not self.given,
+            -enough,
+            self.shortest.duration,
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -195,6 +205,7 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
         orientation_error=float(motion.orientation_error.max()),
         velocity=np.abs(np.diff(q, axis=0)).max(axis=0) / dt * slowing,
         acceleration=np.abs(np.diff(moving, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
+        leap=float((np.abs(q[1] - q[0]) / dt / scenario.largest_qdot).max()),
         room=np.minimum(q - arm.lower, arm.upper - q).min(axis=0),
         shortest=timings[0],
         asked=timings[1],
