@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.controller import kernels
-from baselines.controller.drives import IDENTIFY, Drives, identified, policy_for
+from baselines.controller.drives import IDENTIFY, LONGEST, Drives, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, Window, coordinates, numbers
 from baselines.controller.timing import Timing, timing_of, warn_if_slow
@@ -49,7 +49,7 @@ class Controller:
 
     *Limits.* Commands stay within the velocities and accelerations of the model, and end at its stops, as in the
     environment. With imperfect drives they are at most 1.25 times as fast as the policy wanted to be within the last
-    second.
+    second, and joints without a limit of acceleration have that of :attr:`Guards.stopping_time`.
 
     *Guards.* What cannot be right ends in a controlled stop, which lasts until :meth:`reset`, see :class:`Guards` and
     :attr:`stopped`. Joint coordinates must not jump by 2π: unwrap them. Only arrays of a wrong shape raise an error.
@@ -78,7 +78,7 @@ class Controller:
         steps: int | None = None,
     ) -> None:
         self._scenario, self._guards = scenarios.find(scenario), Guards() if guards is None else guards
-        self.policy = policy_for(self._scenario, policy, drives, self._guards.age)
+        self.policy = policy_for(self._scenario, policy, drives, self._guards)
         if self.policy.reference and steps is None:
             raise InvalidInputError(f"{self.policy.name} has privileged information on one episode: give its steps.")
         self._steps = None if steps is None else whole_number("steps", steps, at_least=1)
@@ -86,7 +86,8 @@ class Controller:
         problem = self._problem = self.policy.problem
         self._limits = limit_rows(problem.model, problem.largest_qdot, problem.dt)
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
-        self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers()
+        delay = LONGEST if self._given is None else self._given.delay
+        self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
         self._shown = len(offsets(self.policy.preview))
         self._window, self._joints, self._kind = Window(problem.task), problem.model.joints, problem.task.kind
         self.reset()

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from baselines import registry
+from baselines.controller.guards import Guards
 from baselines.policy import SolverPolicy
 from baselines.spec import PolicySpec, parse_policy
 from baselines.wrapper import policies_in
@@ -23,8 +24,10 @@ IDENTIFY = "identify"
 EVIDENCE = 10.0
 #: The policy that predicts what drives do.
 PREDICTED = "predicted"
+#: The longest delay that is identified, in periods.
+LONGEST = 12
 #: What it is told for a real arm: lags of up to 40 ms, 5 % of the velocity limits for corrections, calm commands.
-SETTINGS: dict[str, Any] = {"lowest_bandwidth": 4.0, "reserve": 0.05, "overdrive": 1.25}
+SETTINGS: dict[str, Any] = {"longest_delay": LONGEST, "lowest_bandwidth": 4.0, "reserve": 0.05, "overdrive": 1.25}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,16 +63,18 @@ class Drives(Frozen):
 
 
 def policy_for(
-    scenario: Scenario, policy: PolicySpec | SolverPolicy, drives: Drives | str, oldest: int
+    scenario: Scenario, policy: PolicySpec | SolverPolicy, drives: Drives | str, guards: Guards
 ) -> SolverPolicy:
     """A policy for an arm with such drives: ``predicted`` around it, unless the drives are perfect.
+
+    What predicts knows the acceleration limits of the guards where the model has none, so that nothing jumps.
 
     Args:
         scenario: The scenario.
         policy: Its name, with parameters or without; or a policy that was made for the scenario. One that has
             ``predicted`` in it is not wrapped again.
         drives: The drives, or :data:`IDENTIFY`.
-        oldest: The oldest measurements that there may be, in steps.
+        guards: The guards.
 
     Raises:
         InvalidInputError: The drives are neither, or told twice; or the policy is none, belongs to another scenario, or
@@ -89,10 +94,12 @@ def policy_for(
         raise InvalidInputError(f"drives: {name} predicts by itself; give it delay and bandwidth, got {drives}.")
     if perfect or inside:
         return registry.make(name, scenario, **parameters)
+    model = scenario.model.replace(acceleration_limit=guards.acceleration(scenario.model))
     known: dict[str, Any] = {}
     if isinstance(drives, Drives):
         known = {"delay": drives.delay, "bandwidth": drives.bandwidth, "identify": False}
-    return registry.make(PREDICTED, scenario, policy=name, options=parameters, oldest=oldest, **SETTINGS, **known)
+    options = {"policy": name, "options": parameters, "oldest": guards.age, **SETTINGS, **known}
+    return registry.make(PREDICTED, scenario.replace(model=model), **options)
 
 
 def identified(diagnostics: Mapping[str, FloatArray]) -> Drives | None:

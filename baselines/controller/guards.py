@@ -9,6 +9,7 @@ import numpy as np
 
 from baselines.controller import kernels
 from baselines.policy import Problem
+from ikgym.arms import Arm
 from ikgym.validation import FloatArray, Frozen, number, whole_number
 
 
@@ -39,15 +40,15 @@ class Guards(Frozen):
     """Bounds of what a controller accepts, and how it stops.
 
     Args:
-        age: The oldest measurements, in control periods. Joint coordinates that do not change at all count as old, too,
-            once the commands since then should have moved a joint by more than `tolerance`.
+        age: The oldest measurements, in control periods. Joint coordinates that do not change for so long, and for the
+            delay of the drives, are old, too, if commands should have moved a joint by more than `tolerance`.
         tolerance: By how much joint coordinates may move farther than at the velocity limit from one measurement to the
             next, and lie outside their limits, in [rad] or [m].
         position_error: The largest distance of the tool from the reference, in [m]; None for any.
         orientation_error: The largest angle from it, in [rad]; None for any. With the tasks ``matrix`` and ``skew`` it
             is the length of what coordinates differ by.
-        stopping_time: In which time a joint stops from its velocity limit where the model has no limit of its
-            acceleration, in [s].
+        stopping_time: In which time a joint stops from its velocity limit, or reaches it, where the model has no
+            acceleration limit, in [s].
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -71,10 +72,19 @@ class Guards(Frozen):
         fastest = np.where(np.isfinite(model.velocity_limit), model.velocity_limit, problem.largest_qdot)
         return np.array([model.lower - self.tolerance, model.upper + self.tolerance, problem.dt * fastest])
 
-    def numbers(self) -> FloatArray:
-        """Age, tolerance, and largest errors; inf where there is none. Shape (4,)."""
+    def numbers(self, delay: int) -> FloatArray:
+        """Age, tolerance, largest errors, inf where there is none, and periods without motion. Shape (5,).
+
+        Args:
+            delay: The longest delay of commands, in periods.
+        """
         errors = [np.inf if one is None else one for one in (self.position_error, self.orientation_error)]
-        return np.array([self.age, self.tolerance, *errors])
+        return np.array([self.age, self.tolerance, *errors, self.age + delay])
+
+    def acceleration(self, model: Arm) -> FloatArray:
+        """The acceleration limits; of joints without one by the time of a stop, in [rad/s²] or [m/s²]. Shape (n,)."""
+        limit, stated = model.acceleration_limit, model.velocity_limit / self.stopping_time
+        return np.where(np.isfinite(limit), limit, stated)
 
     def deceleration(self, problem: Problem) -> FloatArray:
         """How much velocities change in a period of a stop, in [rad/s] or [m/s]. Shape (n,)."""

@@ -15,7 +15,7 @@ from ikgym.kernels.limits import applied
 NOT_FINITE, STALE, JUMP, OUTSIDE, PATH_ERROR = range(1, 6)
 # Rows of bounds, and numbers, see :class:`baselines.controller.Guards`.
 LOWER, UPPER, WAY = range(3)
-AGE, TOLERANCE, POSITION, ORIENTATION = range(4)
+AGE, TOLERANCE, POSITION, ORIENTATION, FROZEN = range(5)
 # Rows of what is remembered: joint coordinates, how far commands should have moved the joints since they changed.
 MEASURED, TRAVEL = range(2)
 # Counters: whether there was a measurement, its age, and for how many periods it has not changed.
@@ -35,7 +35,7 @@ def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, 
         pose_age: The same of the pose.
         kind: The kind of task coordinates.
         bounds: Shape (3, n).
-        numbers: Shape (4,).
+        numbers: Shape (5,).
         kept: The last measurement, changed in place. Shape (2, n).
         counters: What is counted, changed in place. Shape (3,).
 
@@ -55,7 +55,7 @@ def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, 
         due = due or abs(kept[TRAVEL, j]) > numbers[TOLERANCE]
     first, counters[BEGUN], counters[BEFORE] = counters[BEGUN] == 0.0, 1.0, q_age
     counters[REPEATED] = counters[REPEATED] + 1.0 if same and not first else 0.0
-    frozen = due and counters[REPEATED] > numbers[AGE]
+    frozen = due and counters[REPEATED] > numbers[FROZEN]
     if frozen or not (0.0 <= q_age <= numbers[AGE] and 0.0 <= pose_age <= numbers[AGE]):
         return STALE
     if outside:

@@ -58,6 +58,17 @@ def test_wrong_drives_are_followed_late_and_calmly():
     assert (np.abs(commands).max(axis=0) < 1.3 * peaks(scenario)).all()
 
 
+def test_the_longest_drives_that_are_found():
+    """Twelve periods in which nothing moves are no broken sensor."""
+    scenario = circle("pr2", 4e-3, seconds=2.0)
+    controller, drives = Controller(scenario), Drives(12, 0.04)
+    errors, _ = played(controller, with_drives(scenario, drives))
+    assert controller.stopped is None
+    assert errors[250:].max() < 1e-4
+    assert controller.drives.delay == 12
+    assert controller.drives.time_constant == pytest.approx(0.04, rel=0.01)
+
+
 def test_nothing_is_said_of_drives_that_have_not_moved():
     scenario = circle("panda", 4e-3)
     controller, still = Controller(scenario), np.repeat(scenario.nominal()[:1], Controller(scenario).ahead, axis=0)
