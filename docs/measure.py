@@ -43,6 +43,17 @@ UNTRAINED, SEEDS = "untrained", range(5)
 #: The intervals of `agents_interval`, its agent, scenario and episodes.
 INTERVALS, AGENT, SCENARIO, EPISODES = (1, 2, 4, 8, 16, 32, 64), "agent_alone", "varga7-pose-random", 256
 
+#: Policies of `plants` by their labels, around the same base.
+RHC = {"policy": "rhc", "options": {"horizon": 60, "iterations": 3, "move_blocks": 8}}
+AROUND = {"policy": "predicted", "options": RHC}
+ADAPTIVE: dict[str, tuple[str, dict[str, Any]]] = {
+    "filter_bank": ("filter_bank", {**AROUND, "start": 1e-5}),
+    "calibrated": ("calibrated", {**AROUND, "start": 1e-5}),
+    "calibrated, 1 mm": ("calibrated", {**AROUND, "start": 1e-5, "pose_noise": 1e-3, "pose_rotation_noise": 1e-3}),
+    "calibrated, 10 µm": ("calibrated", {**AROUND, "start": 1e-5, "pose_noise": 1e-5, "pose_rotation_noise": 1e-5}),
+    "offset_free": ("offset_free", AROUND),
+}
+
 #: Steps over which times in batches are taken: a multiple of all intervals.
 BATCHED = 256
 
@@ -56,7 +67,7 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval."""
+    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, plants."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -181,6 +192,18 @@ def periods(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     return out
 
 
+def plants(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
+    """Costs of adaptive policies on imperfect plants, by the lines of the table; there are no times."""
+    old = from_csv((RESULTS / "plants.csv").read_text(encoding="utf-8"))
+    return [dict(line) if only_times or (only_new and line["cost_ratio"]) else _adaptive(line) for line in old]
+
+
+def _adaptive(line: Line) -> Line:
+    rows = evaluate(line["scenario"], [ADAPTIVE[line["policy"]]], episodes=int(line["episodes"]), progress=True)
+    [found] = records(rows)
+    return {**line, **{column: found[column] for column in ("cost_ratio", "low", "high", "worst")}}
+
+
 def _batch_time(scenario: ikgym.Scenario, policy: Any, seeds: Sequence[int]) -> float:
     """The mean time of an arm in [µs] where `predict` is called for all episodes at once."""
     envs: Any = gym.make_vec("RedundantIK-v0", num_envs=len(seeds), scenario=scenario, preview=policy.preview)
@@ -199,7 +222,8 @@ def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        make = {"agents_interval": intervals, "periods": periods}.get(name, functools.partial(measured, name))
+        own = {"agents_interval": intervals, "periods": periods, "plants": plants}
+        make = own.get(name, functools.partial(measured, name))
         new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times

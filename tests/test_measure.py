@@ -83,3 +83,13 @@ def test_intervals_have_costs_and_times(monkeypatch):
     assert seldom["time_batch_us"] < every["time_batch_us"]
     times = ["time_mean_us", "time_p99_us", "time_max_us", "time_batch_us"]
     assert measure.intervals(only_new=True)[1] == seldom | dict.fromkeys(times)
+
+
+def test_plants_are_measured_by_the_lines_of_their_table(tmp_path, monkeypatch):
+    monkeypatch.setattr(measure, "RESULTS", tmp_path)
+    monkeypatch.setattr(measure, "ADAPTIVE", {"mine": ("dls", {"gain": 0.5})})
+    head = "policy,scenario,episodes,cost_ratio,low,high,worst\n"
+    (tmp_path / "plants.csv").write_text(f"{head}mine,panda-payload,2,,,,\nother,panda-bus,2,1.5,1.4,1.6,1.6\n")
+    new, old = measure.plants(only_new=True)
+    assert 1.0 < new["low"] < new["cost_ratio"] < new["high"] <= new["worst"]
+    assert old["cost_ratio"] == "1.5"
