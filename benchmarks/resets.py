@@ -1,5 +1,9 @@
 """Resets of learning environments: random actions end episodes after some 60 steps."""
 
+from __future__ import annotations
+
+import functools
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -32,7 +36,24 @@ def tables(effort: Effort = FULL) -> list[Table]:
         f"`ikgym.rl.make_vec({SCENARIO!r}, N)` with random actions, medians: the time of a reset of all rows over that "
         "of a step of all; and steps where episodes end when the track is lost, beside those where they do not."
     )
-    return [Table("Resets of learning environments", note, columns, rows)]
+    return [Table("Resets of learning environments", note, columns, rows), by_id(effort)]
+
+
+def by_id(effort: Effort) -> Table:
+    """Resets over steps of the environments by id."""
+    sizes = (8, 64) if effort is FULL else effort.rows
+    made: dict[tuple[str, int, str], Callable[[], object]] = {}
+    for name, n in itertools.product(rl.IDS, sizes):
+        envs = rl.IDS[name].arms(n, lost_distance=None)
+        envs.reset(seed=0)
+        still = np.zeros(envs.action_space.shape, dtype=np.float32)
+        made |= {(name, n, "reset"): envs.reset, (name, n, "step"): functools.partial(envs.step, still)}
+    times = medians(made, effort.rounds, effort.seconds)
+    rows: dict[str, tuple[float | None, ...]] = {
+        name: tuple(times[name, n, "reset"] / times[name, n, "step"] for n in sizes) for name in rl.IDS
+    }
+    note = "The time of a reset of all rows over that of a step of all, medians."
+    return Table("Resets of environments by id", note, tuple(f"N = {n}" for n in sizes), rows)
 
 
 def calls(n: int) -> dict[str, Callable[[], object]]:

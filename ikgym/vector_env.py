@@ -39,9 +39,8 @@ class RedundantIKVectorEnv(
 ):
     """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
 
-    Observation, action, reward, info and end of an episode are those of the single environment, with a leading
-    axis of N. Over whole episodes all of it is bit-identical to Gymnasium's `SyncVectorEnv`, in every autoreset
-    mode, with seeds seed + i.
+    Observation, action, reward, info and end of an episode are those of the single environment, with a leading axis of
+    N. Over whole episodes all of it is bit-identical to `SyncVectorEnv`, in every autoreset mode, with seeds seed + i.
 
     | `autoreset_mode` | effect on a row whose episode has ended |
     |---|---|
