@@ -105,9 +105,8 @@ class FilterBank(Corrected):
     def own_memory(self, rows: int) -> BankMemory:
         """See :meth:`Wrapper.own_memory`."""
         prior = prior_covariance(self.problem.model.joints, self.zero, self.link, self.axis)
-        filters = len(self.noises)
-        covariances = np.tile(prior, (rows, filters, 1, 1))
-        weights = np.full((rows, filters), -math.log(filters))
+        covariances = np.tile(prior, (rows, len(self.noises), 1, 1))
+        weights = np.full(covariances.shape[:2], -math.log(len(self.noises)))
         since = np.zeros(rows, np.int64)
         return BankMemory(*self.sensors(rows), np.zeros(covariances.shape[:3]), covariances, weights, since)
 
@@ -123,8 +122,7 @@ class FilterBank(Corrected):
         """See :meth:`Corrected.learn`."""
         kept = own._replace(since=own.since + 1)
         if measured.new.any() or measured.first.any():
-            filters = {name: getattr(own, name).copy() for name in ("estimates", "covariances", "weights")}
-            kept = kept._replace(**filters)
+            kept = kept._replace(**{name: getattr(own, name).copy() for name in own._fields[3:6]})
         known, noises = (self.problem.model.chain, self.problem.task.kind), np.array(self.noises)
         if self.start is not None and measured.first.any():
             exact, first = np.full_like(noises, self.start**2), np.ascontiguousarray(batch.nominal[:, 0])
