@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
 from baselines.evaluation.compare.rule import PREFERRED, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
@@ -24,8 +25,6 @@ from ikgym.scenarios import Scenario
 AS_IT_IS, RETIMED, LATE = "as it is", "retimed", "late drives"
 #: Drives with a lag of first order, its time constant in [s], and a delay in steps.
 LAG, DELAY = 0.02, 2
-#: What plays with late drives: any solver, shown the arm as it will be.
-WRAPPER = "predicted"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ class Comparison:
         follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
         lines = summarise(self.rows)
         columns = fitting((*COLUMNS, follows), lines, width)
-        texts = [f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as {WRAPPER}:policy=…"]
+        texts = [f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as baselines.Controller plays it"]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
         last = textwrap.fill(str(self.recommendation), width)
         return "\n".join([plain(columns, lines, width), "", *below, "", last])
@@ -61,7 +60,7 @@ class Comparison:
 
 def solver_of(row: Row) -> str:
     """The solver of a row, also of one with late drives."""
-    return str(row.parameters["policy"] if row.policy == WRAPPER else row.policy)
+    return str(row.parameters["policy"] if row.policy == PREDICTED else row.policy)
 
 
 COLUMNS = (
@@ -94,7 +93,7 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     as_it_is, retimed = (_by_solver(played, name) for name in (AS_IT_IS, RETIMED))
     taken = paths[needs_retiming(as_it_is, retimed, scenario.dt)]
     driven = taken.replace(name=LATE, plant=late(scenario.plant))
-    delayed = evaluate(driven, [f"{WRAPPER}:policy={name}" for name in as_it_is], progress=progress)
+    delayed = evaluate(driven, [(PREDICTED, {"policy": name, **SETTINGS}) for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
     return Comparison(scenario.dt, [*played, *delayed], chosen, notes)
 

@@ -95,7 +95,7 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
     least = min(rows[name].qddot_peak for name in kept)
     solver = next(name for name in kept if rows[name].qddot_peak <= CALM * least)
     before = [name for name in PREFERRED[: PREFERRED.index(solver)] if name in rows]
-    also = f"with late drives too, as predicted:policy={solver}" if robust else "but not with late drives"
+    also = "with late drives too" if robust else "but not with late drives"
     reasons = [
         *[missed] * slower,
         *(f"{name} {_drawback(name, rows, late if robust else {}, dt, least)}." for name in before),

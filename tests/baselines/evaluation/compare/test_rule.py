@@ -26,7 +26,7 @@ ALL_MISS = rows(qp=MISSES, sns=MISSES, dls=MISSES)
 def test_qp_is_taken_where_nothing_stands_in_the_way():
     chosen = recommend(rows(), rows(), rows(), DT)
     assert (chosen.solver, chosen.retimed, chosen.late) == ("qp", False, True)
-    assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too, as predicted:policy=qp."
+    assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too."
 
 
 @pytest.mark.parametrize(
