@@ -1,5 +1,7 @@
 """Parameters and results as JSON: equal texts for equal values, numbers of few digits, an item of a list a line."""
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Mapping

@@ -1,5 +1,7 @@
 """Episodes of a policy as a data set of Minari: ``ikgym dataset``."""
 
+from __future__ import annotations
+
 import contextlib
 import pathlib
 import shutil

@@ -8,6 +8,8 @@
 The same on the command line: ``python -m baselines.evaluate --help``.
 """
 
+from __future__ import annotations
+
 from baselines.evaluation.run import evaluate
 
 __all__ = ["evaluate"]

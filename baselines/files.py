@@ -1,5 +1,7 @@
 """Files that the project writes: each is replaced in one go, a folder has one writer, and reading has one check."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import errno

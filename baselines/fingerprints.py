@@ -1,5 +1,7 @@
 """Digests of scenarios, episodes and sets of episodes, which identify results."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 from collections.abc import Iterable, Mapping

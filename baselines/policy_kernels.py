@@ -1,5 +1,7 @@
 """Kernels shared by all policies, from the observation to the cut at the velocity limit."""
 
+from __future__ import annotations
+
 import math
 import types
 from typing import Any, NamedTuple

@@ -1,5 +1,7 @@
 """Policies as text: ``"dls"``, ``"dls:damping=1e-2"``, ``"agent:PATH"``."""
 
+from __future__ import annotations
+
 import ast
 from collections.abc import Mapping
 from typing import Any

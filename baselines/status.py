@@ -1,5 +1,7 @@
 """Status of a solve. A failed solve is data, not an exception."""
 
+from __future__ import annotations
+
 import enum
 
 import numpy as np

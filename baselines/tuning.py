@@ -12,6 +12,8 @@ A parameter with a dot is a key of a parameter that is a table itself: ``"option
 One file, although long: ranges and folders of trials are checked with the parts of a search.
 """
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import json

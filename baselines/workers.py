@@ -1,5 +1,7 @@
 """Work in other processes: processes of this machine, or tasks on a cluster of Ray."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import logging

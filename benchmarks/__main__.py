@@ -1,5 +1,7 @@
 """Measures speed, prints the tables and writes them: ``python -m benchmarks --out DIR``."""
 
+from __future__ import annotations
+
 import dataclasses
 import datetime
 import pathlib

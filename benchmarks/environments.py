@@ -1,5 +1,7 @@
 """Steps of environments: one through `gym.make`, and many at once."""
 
+from __future__ import annotations
+
 import time
 import warnings
 from collections.abc import Callable

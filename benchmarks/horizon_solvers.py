@@ -1,5 +1,7 @@
 """Solvers of the horizon problem behind one interface: policies of `baselines`, and those of others."""
 
+from __future__ import annotations
+
 import abc
 import importlib
 from collections.abc import Callable, Sequence

@@ -1,5 +1,7 @@
 """The receding horizon beside gradient descent, IPOPT and Crocoddyl: time of a solve, and the cost that it reaches."""
 
+from __future__ import annotations
+
 import statistics
 from collections.abc import Callable
 from typing import Any

@@ -6,6 +6,8 @@ the first 0.2 s, that of `dls` on the same episodes, and the geometric mean of t
 in which the machine did something else does not count.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import time

@@ -1,5 +1,7 @@
 """How speed is measured: the sizes of the tables, and medians of interleaved calls."""
 
+from __future__ import annotations
+
 import dataclasses
 import statistics
 import time

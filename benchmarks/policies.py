@@ -1,5 +1,7 @@
 """Times of `predict` along an episode, one arm at a time."""
 
+from __future__ import annotations
+
 import time
 
 import gymnasium as gym

@@ -1,5 +1,7 @@
 """Solvers of the inverse kinematics of a pose behind one interface: ikgym's, and those of others."""
 
+from __future__ import annotations
+
 import importlib
 import tempfile
 from collections.abc import Callable, Mapping

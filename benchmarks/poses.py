@@ -1,5 +1,7 @@
 """Forward and inverse kinematics beside other libraries: how fast, and how many of random poses are met."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Mapping
 

@@ -1,5 +1,7 @@
 """Tables of figures as text and Markdown, and the report with all of them."""
 
+from __future__ import annotations
+
 import dataclasses
 import importlib.metadata
 from collections.abc import Mapping, Sequence

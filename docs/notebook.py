@@ -1,5 +1,7 @@
 """Runs the notebook, and keeps what its cells show: ``python -m docs.notebook``."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

@@ -4,6 +4,8 @@ Pictures and the CSV file that ``ikgym reproduce`` has written there come into t
 then writes the tables of the page.
 """
 
+from __future__ import annotations
+
 import io
 import sys
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Draws the pictures of the README and of the results: ``python -m docs.pictures``."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any, NamedTuple
 

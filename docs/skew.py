@@ -6,6 +6,8 @@ the cheapest path of an episode with the cheapest one of the right orientation; 
 tables are written to `docs/results`.
 """
 
+from __future__ import annotations
+
 import json
 import sys
 from collections.abc import Sequence

@@ -3,6 +3,8 @@
 A test fails if a table in a page differs.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import inspect
 import re

@@ -1,5 +1,7 @@
 """The command ``ikgym`` as it is called on a terminal, and what it prints there."""
 
+from __future__ import annotations
+
 import contextlib
 import functools
 import io

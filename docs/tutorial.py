@@ -1,5 +1,7 @@
 """Runs tutorials word by word, and writes what they print into their pages: ``python -m docs.tutorial [PAGE …]``."""
 
+from __future__ import annotations
+
 import contextlib
 import io
 import re

@@ -1,5 +1,7 @@
 """The tracking cost, the score of every policy."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 

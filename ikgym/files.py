@@ -1,5 +1,7 @@
 """Files: atomic writing, and bounded reading of files of users."""
 
+from __future__ import annotations
+
 import os
 import pathlib
 import re

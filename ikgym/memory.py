@@ -1,5 +1,7 @@
 """Checks that there is memory for something, before a machine runs out of it."""
 
+from __future__ import annotations
+
 import contextlib
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Checks of the arguments of environments: options, seeds, masks and autoreset modes."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

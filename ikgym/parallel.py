@@ -4,6 +4,8 @@ Threads of our own instead of numba's parallel loops: those abort where two Pyth
 a process forks after its first use, and both happen in the life of an environment.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,5 +1,7 @@
 """A registry of named members, each made when first needed."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Generic, TypeVar
 

@@ -1,5 +1,7 @@
 """Rows of a vector environment: one as a single environment, and infos of all as Gymnasium lays them out."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

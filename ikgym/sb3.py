@@ -1,5 +1,7 @@
 """The native vector environment as a `VecEnv` of Stable-Baselines3: ``pip install "ikgym[train]"``."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from copy import deepcopy

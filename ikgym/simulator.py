@@ -1,5 +1,7 @@
 """N episodes of one scenario side by side: the core of both environments and of the evaluation."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

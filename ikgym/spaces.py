@@ -1,5 +1,7 @@
 """The spaces of a scenario, with bounds that are finite and true."""
 
+from __future__ import annotations
+
 import numpy as np
 from gymnasium import spaces
 

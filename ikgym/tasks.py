@@ -1,5 +1,7 @@
 """Task coordinates: the numbers in which a pose is prescribed, measured and compared."""
 
+from __future__ import annotations
+
 import dataclasses
 
 import numpy as np

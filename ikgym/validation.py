@@ -1,5 +1,7 @@
 """Checks of user input: a clear error, or a read-only copy."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping

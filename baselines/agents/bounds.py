@@ -1,5 +1,7 @@
 """Actions of agents within the limits of the arm."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Self
 

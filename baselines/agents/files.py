@@ -1,5 +1,7 @@
 """The file of an agent: tensors, and a JSON text that describes them. Reading one executes nothing in it."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 import json

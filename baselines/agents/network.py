@@ -1,5 +1,7 @@
 """The network of an agent: a multi-layer perceptron in float32, one kernel from features to output."""
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
 import math

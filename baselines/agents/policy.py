@@ -1,5 +1,7 @@
 """Learned agents as policies."""
 
+from __future__ import annotations
+
 import dataclasses
 import os
 import pathlib

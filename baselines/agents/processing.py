@@ -1,5 +1,7 @@
 """The interface of processings: observations to features, network outputs to actions."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from collections.abc import Mapping

@@ -1,5 +1,7 @@
 """Agents trained in the environments of :mod:`ikgym.rl`: the same features, and actions in the same unit."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from typing import ClassVar, Literal, get_args

@@ -1,5 +1,7 @@
 """Reading the words after a command; whatever is wrong with them is refused in one line, before anything is done."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import io

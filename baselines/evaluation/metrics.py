@@ -1,5 +1,7 @@
 """Rows: the scores of one episode, and the machine that it was played on."""
 
+from __future__ import annotations
+
 import collections
 import dataclasses
 import functools

@@ -1,5 +1,7 @@
 """Plays the jobs of an evaluation, in this process or in others: those of one policy in one scenario together."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import functools

@@ -1,5 +1,7 @@
 """All forms in which a user can give a policy: name, text with parameters, class, instance, import path, object."""
 
+from __future__ import annotations
+
 import dataclasses
 import pickle
 import sys

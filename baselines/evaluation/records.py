@@ -4,6 +4,8 @@ Names of columns end with the unit (`time_p50_us`), and an interval is a pair of
 a prefix.
 """
 
+from __future__ import annotations
+
 import csv
 import io
 import re

@@ -1,5 +1,7 @@
 """The folder of an evaluation, complete on disk at any time, so that a run can be continued."""
 
+from __future__ import annotations
+
 import csv
 import dataclasses
 import hashlib

@@ -1,5 +1,7 @@
 """The evaluation as a whole: jobs are planned, played and scored, and files are written."""
 
+from __future__ import annotations
+
 import contextlib
 import datetime
 from collections.abc import Callable, Iterable

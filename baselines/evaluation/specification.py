@@ -1,5 +1,7 @@
 """Policy specifications: policies that are not yet bound to a scenario."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 import inspect

@@ -1,5 +1,7 @@
 """The episodes of a policy in a scenario put together: geometric means, bootstrap intervals, worst cases, labels."""
 
+from __future__ import annotations
+
 import collections
 import dataclasses
 import functools

@@ -4,6 +4,8 @@ The digest of scenario, seeds and version of the cost is stated here. A set whos
 results of different sets are never combined.
 """
 
+from __future__ import annotations
+
 import dataclasses
 
 from baselines.fingerprints import set_hash

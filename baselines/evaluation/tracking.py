@@ -1,5 +1,7 @@
 """One episode of one policy as a trajectory: times, joint coordinates and velocities, errors, costs."""
 
+from __future__ import annotations
+
 import dataclasses
 import os
 import pathlib

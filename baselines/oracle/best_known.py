@@ -5,6 +5,8 @@ They lie in `baselines/data/best_known.json`, one record a line. A record belong
 that of :func:`baselines.oracle.stripped.stripped`, so that scenarios in which the same arm moves share their records.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import json

@@ -1,5 +1,7 @@
 """Optima on disk: what took minutes to find is looked up the next time."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 import io

@@ -1,5 +1,7 @@
 """The whole of an episode as one problem: a joint path through all steps that count."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Self
 

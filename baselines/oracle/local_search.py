@@ -5,6 +5,8 @@ which they work on those from ``first`` up to ``last``. A path's result depends 
 threads may share them out as they like.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Settings and results of a search."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 

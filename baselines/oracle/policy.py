@@ -1,5 +1,7 @@
 """The privileged reference: plays the cheapest joint path of the whole episode that is known."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from typing import Any, ClassVar, Self

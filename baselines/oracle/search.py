@@ -1,5 +1,7 @@
 """The search for the cheapest joint path of a whole episode: many starts, local search, Newton's method at the end."""
 
+from __future__ import annotations
+
 import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -1,5 +1,7 @@
 """Best known costs of several episodes, one after the other or by workers."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import functools

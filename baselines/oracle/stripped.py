@@ -5,6 +5,8 @@ through lagging drives or sees it through a noisy camera comes to 1. Scenarios o
 known costs, whatever their drives and sensors.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from ikgym.plant import Plant

@@ -1,5 +1,7 @@
 """The four papers: their figures and claims."""
 
+from __future__ import annotations
+
 from baselines.papers.faitli import claims as faitli_claims
 from baselines.papers.faitli.figures import FIGURES as FAITLI_FIGURES
 from baselines.papers.khan import claims as khan_claims

@@ -1,5 +1,7 @@
 """Comparisons and thresholds that all claims share: like claims have like thresholds."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 
 import numpy as np

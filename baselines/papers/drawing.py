@@ -1,5 +1,7 @@
 """Figures of the papers: panels in rows."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """The ledger: claims of the papers and findings of their tests, as a CSV file and as Markdown."""
 
+from __future__ import annotations
+
 import csv
 import io
 from collections import Counter

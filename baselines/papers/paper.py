@@ -1,5 +1,7 @@
 """The data model of a reproduction: figures to draw again, claims, and the results of their tests."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 import tomllib

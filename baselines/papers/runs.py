@@ -1,5 +1,7 @@
 """Episodes that figures and claims share, each played once."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from threadpoolctl import threadpool_limits

@@ -1,5 +1,7 @@
 """Building blocks of policies: base class, problem, observations, memory and solution."""
 
+from __future__ import annotations
+
 from baselines.policy.arguments import Report
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy

@@ -4,6 +4,8 @@ The state is a flat tuple of arrays, (status, iterations, *memory), each with a 
 needs to know the layout: :func:`pack` makes a state, `SolverPolicy.report` and `SolverPolicy.memory_of` read it.
 """
 
+from __future__ import annotations
+
 import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

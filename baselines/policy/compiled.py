@@ -1,5 +1,7 @@
 """Solvers whose step is one compiled kernel."""
 
+from __future__ import annotations
+
 import abc
 import functools
 from collections.abc import Callable

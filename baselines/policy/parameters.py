@@ -1,5 +1,7 @@
 """Parameters of policies: the range stands beside the default, and is checked when the policy is made."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable

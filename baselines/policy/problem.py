@@ -1,5 +1,7 @@
 """Input and output of a policy: problem, observations, solution."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Any, NamedTuple, Self
 

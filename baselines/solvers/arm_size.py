@@ -1,5 +1,7 @@
 """The size of an arm, from which parameters with a length in their unit take their defaults."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

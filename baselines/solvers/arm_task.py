@@ -1,5 +1,7 @@
 """Kernels that several solvers share: arrays for a pose, and the task shift of one row."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ikgym.kernels import tasks as task_kernels

@@ -1,5 +1,7 @@
 """A callback for training with Stable-Baselines3: scores on the validation split in its logs."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from stable_baselines3.common.callbacks import BaseCallback

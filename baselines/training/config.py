@@ -3,6 +3,8 @@
 One file, although long: most of it is the help text of the options.
 """
 
+from __future__ import annotations
+
 import ast
 import dataclasses
 import json

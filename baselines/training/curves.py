@@ -1,5 +1,7 @@
 """Training curves as a plot: ``python -m baselines.training.curves NAME=DIR … --write FILE``."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 import sys

@@ -1,5 +1,7 @@
 """Exports networks of PyTorch and models of Stable-Baselines3 as agents, which need neither."""
 
+from __future__ import annotations
+
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,5 +1,7 @@
 """The randomness of a run: it follows from the seed and the number of the segment alone."""
 
+from __future__ import annotations
+
 import contextlib
 import random
 from collections.abc import Iterator

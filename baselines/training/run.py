@@ -1,5 +1,7 @@
 """One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 import math

@@ -3,6 +3,8 @@
 ``python -m baselines.training.validation`` computes the reference costs anew, in some minutes.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import json

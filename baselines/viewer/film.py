@@ -1,5 +1,7 @@
 """A video of an episode: one picture for each policy, all at the same time."""
 
+from __future__ import annotations
+
 import itertools
 import pathlib
 import tempfile

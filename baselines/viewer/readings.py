@@ -1,5 +1,7 @@
 """Readings of a posture: manipulability, distances from the joint limits, and colours."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

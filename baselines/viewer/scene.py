@@ -1,5 +1,7 @@
 """Arms side by side in viser's scene, with the reference, the paths and a target that can be dragged."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The viewer as a server: browsers change the session, and the scene follows."""
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import queue

@@ -1,5 +1,7 @@
 """The state of the viewer, without a server: joints moved by hand, a target to follow, or an episode."""
 
+from __future__ import annotations
+
 import enum
 import time
 from collections.abc import Sequence

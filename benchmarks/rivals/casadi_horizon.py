@@ -1,5 +1,7 @@
 """The horizon problem for IPOPT, through CasADi: an independent optimiser of the same cost."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from typing import Any

@@ -1,5 +1,7 @@
 """The arm, its task coordinates and their error as symbols of CasADi."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import casadi

@@ -5,6 +5,8 @@ a class in Python. To do it as little wrong as possible, the arithmetic of a kno
 what remains of Python is a call per knot, and the solver itself is Crocoddyl's C++.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from typing import Any

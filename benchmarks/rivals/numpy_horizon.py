@@ -6,6 +6,8 @@ Varga 2021, section III, has K = HL - 1 and h = w = 1. Written anew from the pap
 ikgym's kernels.
 """
 
+from __future__ import annotations
+
 import dataclasses
 
 import numpy as np

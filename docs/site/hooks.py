@@ -1,5 +1,7 @@
 """Hooks of MkDocs: generated pages, and links out of the folder of the pages."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Notebooks as pages, with what their cells showed when they were last run."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 from nbconvert import MarkdownExporter

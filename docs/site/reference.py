@@ -1,5 +1,7 @@
 """The reference of the API and of the commands, generated from the code each time that the site is built."""
 
+from __future__ import annotations
+
 import importlib
 import inspect
 from types import ModuleType

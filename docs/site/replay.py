@@ -1,5 +1,7 @@
 """The report of ``make demo`` on the landing page, where there is one: the arms move in it."""
 
+from __future__ import annotations
+
 import logging
 import re
 from pathlib import Path

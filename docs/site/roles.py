@@ -1,5 +1,7 @@
 """Docstrings as Markdown: Sphinx's roles become links, and examples at a prompt become code."""
 
+from __future__ import annotations
+
 import importlib.util
 import itertools
 import re

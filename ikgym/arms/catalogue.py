@@ -1,5 +1,7 @@
 """The arms of ``arms.toml``: those of papers and of makers, with their sources."""
 
+from __future__ import annotations
+
 import functools
 import os
 import pathlib

@@ -1,5 +1,7 @@
 """Checks of an arm's fields."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from typing import Any
 

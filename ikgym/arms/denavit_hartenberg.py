@@ -1,5 +1,7 @@
 """Arms from Denavit–Hartenberg tables, standard and modified."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Arms from the poses of their joints at q = 0; the last step of every conversion."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

@@ -3,6 +3,8 @@
 Arms are typed `Any` here, since :mod:`ikgym.arms.arm` imports this module.
 """
 
+from __future__ import annotations
+
 import functools
 import math
 from contextlib import nullcontext

@@ -6,6 +6,8 @@ everywhere but at :data:`SINGULAR`, a direction in which tools seldom point. The
 the axes, does not depend on that choice.
 """
 
+from __future__ import annotations
+
 import math
 
 from ikgym.kernels.jit import inlined, inner, kernel

@@ -1,5 +1,7 @@
 """A message to the user while kernels are compiled, which takes a while and seldom happens."""
 
+from __future__ import annotations
+
 import contextlib
 import logging
 import threading

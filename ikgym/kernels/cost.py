@@ -1,5 +1,7 @@
 """Kernels of the tracking cost: value, gradient and curvature of Φ^X and Φ^U (Varga 2021, section III)."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from ikgym.kernels.jit import inlined, kernel

@@ -1,5 +1,7 @@
 """Kernels of cubic splines, linear in the number of knots."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

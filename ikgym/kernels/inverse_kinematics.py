@@ -6,6 +6,8 @@ a Gauss–Newton step with its quadratic convergence close to it. A joint that a
 and no further, and the other joints make up for what is missing.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -9,6 +9,8 @@ minutes. Here LLVM gets a copy of small kernels alone, which it may inline. Call
 machine code by name. The name is the same in all processes, and whoever loads the caller loads the callee first.
 """
 
+from __future__ import annotations
+
 import functools
 import gc
 import hashlib

@@ -5,6 +5,8 @@ The chain is ``H = H_1 … H_n · H_tool`` with ``H_i = Trans(offset_i) · Rot(a
 link frames are parallel to the base at q = 0.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Kernels: what the limits of an arm make of joint velocities."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -3,6 +3,8 @@
 numba's own `np.linalg` needs SciPy and allocates at every call; at six rows neither pays.
 """
 
+from __future__ import annotations
+
 import math
 
 from ikgym.kernels.jit import inner

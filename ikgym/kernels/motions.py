@@ -1,5 +1,7 @@
 """Kernels: joint motions, random control points of splines, and the nominal frames along motions."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

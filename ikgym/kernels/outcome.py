@@ -1,5 +1,7 @@
 """Observation and cost of N arms after a step, in one block of numbers and as arrays."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Kernels: random numbers as a function of a key and a counter, without a state."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -4,6 +4,8 @@ All of them are compiled, take float64 arrays and raise nothing. A rotation is a
 determinant 1, an axis a unit vector of shape (3,).
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -4,6 +4,8 @@ Everything that happens in a step happens here, row by row, so that one environm
 native vector environment agree bit for bit, whatever the number of threads.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -4,6 +4,8 @@ A frame is a pose as one row of numbers: the 9 of the rotation, row by row, then
 trajectory without orientation has the last 3 only.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Kernels: the arms, loops and delays that episodes draw."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Checks of the fields of a plant."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Draws of a plant, once an episode."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Kernels: what the drives of a plant make of commands."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ikgym.kernels.jit import inlined

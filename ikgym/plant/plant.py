@@ -1,5 +1,7 @@
 """The plant: deviations of the arm, its drives and its sensors from the data sheet."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math

@@ -1,5 +1,7 @@
 """The plants of N arms that are simulated side by side."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any
 

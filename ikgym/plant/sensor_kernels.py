@@ -1,5 +1,7 @@
 """Kernels: what the sensors of a plant show."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

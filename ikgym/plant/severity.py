@@ -1,5 +1,7 @@
 """Plants at other severities."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from typing import Any

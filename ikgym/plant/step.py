@@ -1,5 +1,7 @@
 """Kernel: one step of N arms whose plant is not ideal."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -13,6 +13,8 @@ so only the first one is kept. Initial trajectories are those from the first sta
 network `FREEALL_Task` (`pirl_rl_test_1`). RL-ITG's joint interpolations, which do not follow the paths, are left out.
 """
 
+from __future__ import annotations
+
 import functools
 import pathlib
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
 """An error over time on a logarithmic axis."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

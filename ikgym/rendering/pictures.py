@@ -1,5 +1,7 @@
 """Pictures of one row's episodes."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

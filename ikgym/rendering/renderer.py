@@ -1,5 +1,7 @@
 """Draws episodes, in memory or in a window."""
 
+from __future__ import annotations
+
 import logging
 import math
 import time as clock

@@ -4,6 +4,8 @@ Axes, grid and legend are drawn once an episode and kept as pixels. A frame rest
 parts.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

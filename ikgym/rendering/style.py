@@ -1,5 +1,7 @@
 """Style of the pictures: colours, font sizes, and thinning of long curves."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ikgym.validation import FloatArray

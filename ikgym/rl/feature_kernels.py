@@ -1,5 +1,7 @@
 """Kernels of the features of learning agents: the required twist, each joint's share in it, and the twists ahead."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Kernels of twists: the motion from a pose to a reference pose, as vectors that turn with the base frame."""
 
+from __future__ import annotations
+
 import math
 
 from ikgym.kernels import tasks as task_kernels

@@ -10,6 +10,8 @@ h' = (I - G' J) h, replaces h. An output holds G and h, then ln λ relative to t
 are clipped at ±:data:`LARGEST`.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Kernels of the bilinear agent: its features with their gradient, and its law."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from baselines.agents.bilinear.damped_kernels import held_rows

@@ -1,5 +1,7 @@
 """The features and the law of the bilinear agent."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self

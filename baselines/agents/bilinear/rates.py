@@ -12,6 +12,8 @@ weighted least-squares step approaches the least sum of fourth powers, which joi
 reweighted least squares, Burrus 1994); the exponent allows for a single step.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

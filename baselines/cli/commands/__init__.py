@@ -1,1 +1,3 @@
 """The commands of ``ikgym``, one module each."""
+
+from __future__ import annotations

@@ -1,5 +1,7 @@
 """The command line of ``ikgym dataset``."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
 """Compares policies on test sets or scenarios in one table with intervals: ``ikgym leaderboard``."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 from collections.abc import Mapping, Sequence

@@ -1,5 +1,7 @@
 """The best known costs, ``ikgym oracle``."""
 
+from __future__ import annotations
+
 import dataclasses
 import sys
 from collections.abc import Iterator, Sequence

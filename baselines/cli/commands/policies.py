@@ -1,5 +1,7 @@
 """The command ``ikgym policies``."""
 
+from __future__ import annotations
+
 import dataclasses
 import inspect
 import re

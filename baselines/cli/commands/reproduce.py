@@ -4,6 +4,8 @@
 >>> findings = reproduce(["zhang"])
 """
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import json

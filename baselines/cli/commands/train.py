@@ -1,5 +1,7 @@
 """The command line of `train.py` and `ikgym train`."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import importlib.util

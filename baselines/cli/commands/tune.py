@@ -1,5 +1,7 @@
 """The command line of ``ikgym tune``."""
 
+from __future__ import annotations
+
 import dataclasses
 import datetime
 import pathlib

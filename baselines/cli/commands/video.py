@@ -1,5 +1,7 @@
 """The command ``ikgym video``: an episode as a video, policies side by side."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 import sys

@@ -1,5 +1,7 @@
 """The command ``ikgym view``: solvers side by side in a browser, live and in an episode."""
 
+from __future__ import annotations
+
 import dataclasses
 import pathlib
 import sys

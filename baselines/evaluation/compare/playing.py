@@ -52,7 +52,9 @@ class Comparison:
         follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
         lines = summarise(self.rows)
         columns = fitting((*COLUMNS, follows), lines, width)
-        texts = [f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as baselines.Controller plays it"]
+        texts = [
+            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as baselines.Controller plays it"
+        ]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
         last = textwrap.fill(str(self.recommendation), width)
         return "\n".join([plain(columns, lines, width), "", *below, "", last])

@@ -1,5 +1,7 @@
 """Faitli and Tar 2018: the tests of the claims in ``claims.toml``, each function named after its claim."""
 
+from __future__ import annotations
+
 import itertools
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Faitli and Tar 2018: episodes that figures and claims share, and their Jacobians."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

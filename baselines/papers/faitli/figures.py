@@ -1,5 +1,7 @@
 """Faitli and Tar 2018: figures 2 to 6."""
 
+from __future__ import annotations
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure

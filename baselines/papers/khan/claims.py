@@ -3,6 +3,8 @@
 Those of sections 2 and 5 are in modules of their own.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from baselines.papers.comparisons import SAME, differ, extent, larger

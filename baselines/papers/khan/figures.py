@@ -1,5 +1,7 @@
 """Khan and Tar 2020: figures 3 to 19."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

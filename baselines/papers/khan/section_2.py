@@ -1,5 +1,7 @@
 """Khan and Tar 2020, section 2: claims on iterations without the Jacobian (eq. 2.5 to 2.8), and the damped inverse."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

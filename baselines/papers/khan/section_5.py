@@ -1,5 +1,7 @@
 """Khan and Tar 2020, section 5: claims on wrong models, measurements, and solvers with inversion."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

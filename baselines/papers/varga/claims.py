@@ -1,5 +1,7 @@
 """Varga 2021: the tests of the claims in ``claims.toml``, each function named after its claim."""
 
+from __future__ import annotations
+
 import time
 from typing import Any
 

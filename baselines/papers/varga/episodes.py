@@ -1,5 +1,7 @@
 """Varga 2021: episodes that figures and claims share, and measures of their fluctuation."""
 
+from __future__ import annotations
+
 import itertools
 import time
 from typing import Any

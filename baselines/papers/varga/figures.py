@@ -1,5 +1,7 @@
 """Varga 2021: figures 2 to 14."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -3,6 +3,8 @@
 For times only, beside those of compiled kernels; the results are those of ``rhc_gradient``.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from ikgym.arms import Arm

@@ -3,6 +3,8 @@
 Those of sections IV and V are in modules of their own.
 """
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Mapping
 from typing import Any

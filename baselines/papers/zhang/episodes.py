@@ -1,5 +1,7 @@
 """Zhang 2020: episodes that figures and claims share, their inputs, outputs, Jacobians and λ."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

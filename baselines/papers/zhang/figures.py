@@ -1,5 +1,7 @@
 """Zhang 2020: figures 2 to 4 of example 1, and 6 to 9 of example 2."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

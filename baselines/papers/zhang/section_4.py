@@ -1,5 +1,7 @@
 """Zhang 2020, section IV with remarks 4 and 5: claims on predictive control (MFAPC) beside MFAC."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable
 

@@ -1,5 +1,7 @@
 """Zhang 2020, section V: claims on both examples, and on times."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 

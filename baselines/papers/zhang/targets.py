@@ -1,5 +1,7 @@
 """Zhang 2020: random, singular and resting targets of the inverse kinematics, and the iterates of solvers."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple

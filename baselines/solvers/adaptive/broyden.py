@@ -1,5 +1,7 @@
 """Damped least squares with a Jacobian that is learnt from measured poses by Broyden's formula."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

@@ -5,6 +5,8 @@ offsets from joint to joint and to the tool point (3 n + 3), and how far each ax
 (2 n). As on the plant, see :class:`ikgym.Plant`.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Base of policies that correct the model of a base policy, which sees its model's poses and a shifted reference."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 import math

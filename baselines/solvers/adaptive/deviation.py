@@ -5,6 +5,8 @@ the base frame. Skew coordinates do not tell an orientation: theirs is the diffe
 that the task does not have are 0.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Any policy, whose reference is shifted by what measured poses differ from those of the model."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

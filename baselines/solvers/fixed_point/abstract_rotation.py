@@ -1,5 +1,7 @@
 """Adaptive inverse kinematics by abstract rotations, without inversion (Khan and Tar 2020)."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math

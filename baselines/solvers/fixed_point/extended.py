@@ -1,5 +1,7 @@
 """The fixed-point transformation with one more point of the arm prescribed (Faitli and Tar 2018, conclusion)."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

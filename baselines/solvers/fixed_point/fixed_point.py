@@ -1,5 +1,7 @@
 """Matrix-inversion-free inverse kinematics by fixed-point transformation (Faitli and Tar 2018; Khan and Tar 2020)."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from collections.abc import Sequence

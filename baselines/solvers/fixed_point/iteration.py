@@ -1,5 +1,7 @@
 """The kernel of the fixed-point transformation: the iterations of one step (Faitli 2018, eq. 1; Khan 2020, eq. 2.8)."""
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

@@ -4,6 +4,8 @@ The matrix ``O = I + sin ξ G + (1 - cos ξ) G²`` with ``G = e_a e_bᵀ - e_b e
 differs from I by two rows and columns, so that a vector is turned with four scalar products.
 """
 
+from __future__ import annotations
+
 import math
 
 from baselines.solvers.linear_algebra import dot

@@ -1,5 +1,7 @@
 """What the iterations of Zhang 2020 share as policies and as kernels: the choice of a damping rule, and its memory."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from typing import Any, NamedTuple

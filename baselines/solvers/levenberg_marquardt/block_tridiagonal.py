@@ -8,6 +8,8 @@ where M = L⁻¹ L⁻ᵀ is block tridiagonal: -I beside the diagonal, and I, 2I
 apart, which is the shortcut (38).
 """
 
+from __future__ import annotations
+
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
 from ikgym.kernels.jit import inlined, inner
 

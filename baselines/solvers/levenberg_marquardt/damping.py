@@ -4,6 +4,8 @@ All rules are three laws in other numbers: a look-up by the error and the condit
 to the squared error, and λ stepped up or down from one iteration to the next.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType

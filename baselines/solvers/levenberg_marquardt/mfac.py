@@ -1,5 +1,7 @@
 """Model-free adaptive control, which is the iteration of Levenberg and Marquardt (Zhang 2020, section III)."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

@@ -1,5 +1,7 @@
 """Model-free adaptive predictive control: damped least squares over a horizon (Zhang 2020, sections IV and V)."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

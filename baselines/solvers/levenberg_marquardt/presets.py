@@ -1,5 +1,7 @@
 """The controllers of the two examples of Zhang 2020, with the numbers printed there."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

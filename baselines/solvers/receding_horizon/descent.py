@@ -1,5 +1,7 @@
 """Kernels of a gradient descent with the adaptive step of Varga 2021, section IV."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

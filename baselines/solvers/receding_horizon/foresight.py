@@ -1,5 +1,7 @@
 """Receding horizon that plans three seconds ahead in real time."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

@@ -1,5 +1,7 @@
 """Receding horizon by gradient descent, without Lagrange multipliers (Varga, Issa, Horváth, Tar 2021)."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from typing import Any, ClassVar

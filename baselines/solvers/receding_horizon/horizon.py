@@ -3,6 +3,8 @@
 A horizon of HL grid points has point 1 at the present, and HL - 1 free joint velocities (Varga 2021, section III).
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

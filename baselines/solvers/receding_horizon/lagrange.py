@@ -1,5 +1,7 @@
 """Receding horizon the traditional way: states, Lagrange multipliers and the reduced gradient (Varga 2021, eq. 3-4)."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from typing import Any, ClassVar

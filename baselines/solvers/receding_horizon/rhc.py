@@ -9,6 +9,8 @@ CPU time instead of 0.8. ``recovery_steps=0`` costs 1.000 and 1.01 (1.00 to 1.04
 cost.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

@@ -5,6 +5,8 @@ changed one by one, as position error and rotation vector. The constraints of a 
 q(i+1) − q(i) − Δt q̇(i) = 0 and E(i+1) − ε(q(i+1)) = 0, where ε is the error that the kinematics give.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Plays the nominal joint path that the trajectory was made from, which is privileged information."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from typing import Any, ClassVar, Self

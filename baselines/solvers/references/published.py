@@ -1,5 +1,7 @@
 """Plays an initial trajectory that others published for a path, which is privileged information."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import Any, ClassVar, Self
 

@@ -1,5 +1,7 @@
 """Resolved rate: what all solvers share that answer a desired task velocity by one linear step."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from typing import NamedTuple

@@ -1,5 +1,7 @@
 """Damped least squares: resolved rate with the deformation of Levenberg and Marquardt."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

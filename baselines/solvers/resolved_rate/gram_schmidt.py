@@ -1,5 +1,7 @@
 """Resolved rate by orthonormalising the rows of the Jacobian: a reconstruction."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

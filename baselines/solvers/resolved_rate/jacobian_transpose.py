@@ -1,5 +1,7 @@
 """Resolved rate by the transposed Jacobian: no matrix is inverted."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

@@ -1,5 +1,7 @@
 """Resolved rate by the Moore–Penrose pseudoinverse."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

@@ -1,5 +1,7 @@
 """Resolved rate with a secondary objective in the null space of the task."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple

@@ -1,5 +1,7 @@
 """Resolved rate by the truncated singular value decomposition."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar
 

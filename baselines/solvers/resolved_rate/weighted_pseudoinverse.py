@@ -1,5 +1,7 @@
 """Resolved rate by the pseudoinverse that weighs the joints."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar

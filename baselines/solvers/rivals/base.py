@@ -1,5 +1,7 @@
 """Base of solvers of other projects: their import, their input, and the objects that they reuse."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 import importlib

@@ -1,5 +1,7 @@
 """Pink and mink: weighted tasks under limits, one quadratic program a step."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from typing import Any, ClassVar

@@ -1,5 +1,7 @@
 """The whole orientation behind skew coordinates: their 90° ambiguity, resolved by how the motion goes on."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from typing import ClassVar, NamedTuple

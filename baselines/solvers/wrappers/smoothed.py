@@ -1,5 +1,7 @@
 """Second-order smoothing of the joint path that any policy calculates (Varga 2021, section V)."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import ClassVar, NamedTuple
 

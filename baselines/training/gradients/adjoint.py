@@ -7,6 +7,8 @@ that of the applied one where the acceleration is at its limit, and with respect
 joint comes to rest at a stop.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

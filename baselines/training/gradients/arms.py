@@ -1,5 +1,7 @@
 """N arms, each in an episode of its own, between segments."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

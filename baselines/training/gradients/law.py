@@ -1,5 +1,7 @@
 """The bilinear law in PyTorch: features and segments with compiled gradients."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Analytic policy gradient: the cost is differentiated through the arm, over windows of some steps."""
 
+from __future__ import annotations
+
 import copy
 import itertools
 from collections.abc import Sequence

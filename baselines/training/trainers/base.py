@@ -1,5 +1,7 @@
 """The interface of trainers, and the base of those that train a network without a critic."""
 
+from __future__ import annotations
+
 import abc
 import copy
 from typing import Any

@@ -1,5 +1,7 @@
 """PPO, SAC and TD3 of Stable-Baselines3, unmodified, on :func:`ikgym.sb3.make_vec`."""
 
+from __future__ import annotations
+
 import inspect
 import io
 from typing import Any

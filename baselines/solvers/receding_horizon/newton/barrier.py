@@ -3,6 +3,8 @@
 Limits of acceleration couple three knots, joint by joint: the Hessian is block-pentadiagonal.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -5,6 +5,8 @@ ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks bes
 where they cost something, couple three knots: see :func:`change`.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from baselines.solvers.receding_horizon.newton.second_order import second_order

@@ -1,5 +1,7 @@
 """The time grid of a joint path: knots ahead, and how much each of them counts."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Kernels: initial guesses of a joint path, by damped least squares from knot to knot, and their random numbers."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

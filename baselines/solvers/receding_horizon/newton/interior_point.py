@@ -5,6 +5,8 @@ of double integrators, on which multipliers of an augmented Lagrangian settle sl
 some thirty Newton steps, whatever is active: the barrier parameter is followed to 0.
 """
 
+from __future__ import annotations
+
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, KEPT, Barrier, change_steps, linearise, merit

@@ -1,5 +1,7 @@
 """Kernel: Newton's method for a joint path, with line search, damping and updates of the multipliers."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

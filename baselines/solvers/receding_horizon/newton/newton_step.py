@@ -1,5 +1,7 @@
 """Kernels: Newton steps of block-tridiagonal and block-pentadiagonal models, in time linear in the knots."""
 
+from __future__ import annotations
+
 from baselines.solvers.linear_algebra import inverse_of_factor
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.linear_algebra import cholesky

@@ -1,5 +1,7 @@
 """Kernels: the initial plan of an episode, what is left of a plan one step later, and restart candidates."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

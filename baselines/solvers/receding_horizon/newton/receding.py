@@ -1,5 +1,7 @@
 """Kernel: one control period of a receding horizon, row by row."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Kernels: the second derivatives of the tracking error by the joint coordinates of a knot."""
 
+from __future__ import annotations
+
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.axes import across
 from ikgym.kernels.jit import inlined, uncounted

@@ -1,5 +1,7 @@
 """Settings of a receding horizon for its kernels, in two blocks of numbers."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

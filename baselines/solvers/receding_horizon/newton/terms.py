@@ -15,6 +15,8 @@ with μ. Newton's method with the exact φ'' goes wrong from far; the curvature 
 section 19.3).
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """The problem of a joint path as its kernels see it, and the arrays that they work in."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np
