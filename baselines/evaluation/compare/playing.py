@@ -53,7 +53,7 @@ class Comparison:
         lines = summarise(self.rows)
         columns = fitting((*COLUMNS, follows), lines, width)
         texts = [
-            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as baselines.Controller plays it"
+            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller"
         ]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
         last = textwrap.fill(str(self.recommendation), width)

@@ -37,10 +37,11 @@ def browser(serving):
 def scenario_of(name, folder):
     """A scenario file of that name, with an arm of a URDF file whose joints have the name."""
     toml, quoted = folder / "it.toml", name.replace("&", "&amp;").replace("<", "&lt;").replace("\n", "&#10;")
-    content = urdf(ikgym.arms.get("panda"))
-    for joint in range(1, 8):
+    arm = ikgym.arms.get("panda")
+    content = urdf(arm)
+    for joint, usual in enumerate(arm.joint_names, 1):
         attribute = f"{quoted} {joint}".replace('"', "&quot;")
-        content = content.replace(f'"joint{joint}"', f'"{attribute}"')
+        content = content.replace(f'"{usual}"', f'"{attribute}"')
     (folder / "it.urdf").write_text(content)
     panda = ikgym.scenarios.get("panda-circle").replace(steps=2)
     panda.replace(name=name, arm=ikgym.arms.from_urdf(folder / "it.urdf")).save(toml)
