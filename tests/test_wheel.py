@@ -18,7 +18,7 @@ from hatchling.builders.wheel import WheelBuilder
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("ikgym", "baselines")
 #: What commands read: data, the files that say how agents are trained, and the parts of a report.
-DATA = (".json", ".toml", ".safetensors", ".typed", ".npz", ".txt", ".html", ".css", ".js")
+DATA = (".json", ".toml", ".yml", ".safetensors", ".typed", ".npz", ".txt", ".html", ".css", ".js")
 
 
 @pytest.fixture(scope="module")

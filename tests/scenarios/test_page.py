@@ -16,7 +16,7 @@ from tests.arms.test_urdf import joint, robot
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8").split("## A scenario of your own")[1]
 WHOLE, ON_URDF, PLANT, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
-_, SNIPPET = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+_, SNIPPET, _ = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
 @pytest.fixture

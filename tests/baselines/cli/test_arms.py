@@ -23,6 +23,11 @@ CHAINS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def _wide(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+
+
 def printed(capsys, *words):
     assert main(["arms", *map(str, words)]) == 0
     return capsys.readouterr().out
