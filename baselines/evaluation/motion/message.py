@@ -23,8 +23,9 @@ TOPIC = "/joint_trajectory_controller/joint_trajectory"
 def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> dict[str, Any]:
     """The fields of the message; a time of 0 in the header means at once.
 
-    From rest at the start to rest at the end, see :func:`~.stop.stopped`, with the velocities of a cubic spline, see
-    :func:`~.spline.smooth`. Controllers interpolate cubically between points without accelerations, else by quintics.
+    From rest at the start to rest at the end, see :func:`baselines.evaluation.motion.stop.stopped`, with the velocities
+    of a cubic spline, see :func:`baselines.evaluation.motion.spline.smooth`. Controllers interpolate cubically between
+    points without accelerations, else by quintics.
 
     Raises:
         InvalidInputError: The episode ends in motion, and has no room to stop.
