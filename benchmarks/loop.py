@@ -31,9 +31,9 @@ def tables(effort: Effort = FULL) -> list[Table]:
     rows: dict[str, tuple[float | None, ...]] = {}
     for name, loop in LOOPS.items():
         predict, step = measured(*loop, effort.steps, TURNS if effort is FULL else 1)
-        rows[name] = np.median(predict), np.median(step), np.median(step) - np.median(predict), np.percentile(step, 99)
+        rows[name] = np.median(predict), np.median(step), np.percentile(step, 99)
     note = f"One call, along {TURNS} times {effort.steps:,} steps of `panda-circle` or `varga7-pose-random`."
-    return [Table("Control loop", note, ("`predict` [µs]", "`step` [µs]", "more [µs]", "`step`, p99 [µs]"), rows)]
+    return [Table("Control loop", note, ("`predict` [µs]", "`step` [µs]", "`step`, p99 [µs]"), rows)]
 
 
 def measured(policy: str, scenario: str, drives: Drives | str, given: str, steps: int, turns: int) -> tuple[Any, Any]:
