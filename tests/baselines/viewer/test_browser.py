@@ -48,7 +48,7 @@ def scenario_of(name, folder):
     return ikgym.scenarios.load(toml)
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [HOSTILE[0], *(pytest.param(name, marks=pytest.mark.slow) for name in HOSTILE[1:])])
 def test_names_are_shown_and_do_not_run(name, browser, server, tmp_path):
     stage = Stage.of(scenario_of(name, tmp_path))
     viewer = servers.Viewer(server, Session(stage, ["dls"]))
