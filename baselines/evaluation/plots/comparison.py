@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from baselines.evaluation.plots import style
 from baselines.evaluation.records import Record
@@ -21,8 +21,8 @@ from baselines.evaluation.table import number
 FLOOR = 0.01
 #: Cost ratios above this have the colour of this one.
 CUT = 100.0
-#: Values within this factor have several ticks a decade.
-CLOSE = 300.0
+#: Values within the first factor have several ticks a decade, within the second evenly spaced ones.
+CLOSE, EVEN = 300.0, 4.0
 
 
 def front(lines: Sequence[Record]) -> list[Record]:
@@ -148,13 +148,20 @@ def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> AxesImage:
     return shade
 
 
+def _locator(low: float, high: float) -> Locator:
+    """Ticks at powers of ten, at 1, 2 and 5 where the values are close, and evenly where they are closer."""
+    if high < EVEN * low:
+        return MaxNLocator(8, steps=[1, 2, 2.5, 5, 10])
+    return LogLocator(subs=(1.0, 2.0, 5.0) if high < CLOSE * low else (1.0,))
+
+
 def _logarithmic(axes: Axes) -> None:
-    """Logarithmic axes with plain numbers: ticks at 1, 2 and 5 where the values are close."""
+    """Logarithmic axes with plain numbers, see :func:`_locator`."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
         low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < CLOSE * low else (1.0,)))
+        axis.set_major_locator(_locator(low, high))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
         axis.set_minor_formatter(NullFormatter())
     axes.xaxis.set_minor_locator(NullLocator())

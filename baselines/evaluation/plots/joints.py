@@ -18,6 +18,8 @@ Series = Mapping[str, npt.NDArray[Any]]
 BEYOND, SHADE = "beyond the limits", "#f3d3c8"
 # Limits further off than this share of the range are not shown, as they would flatten the curves; and the edge around.
 NEAR, EDGE = 0.5, 0.04
+# The least range of a panel, in the unit of the quantity.
+SPAN = 1e-3
 
 
 class Quantity(NamedTuple):
@@ -77,11 +79,20 @@ def draw(title: str, log: Series, quantity: Quantity) -> Figure:
             ticks=12 // columns,
         )
         axes.margins(x=0.01)
+        _widen(axes)
         for band in _shade(axes, lower[joint], upper[joint]):
             lines[BEYOND] = band
     drawn.align_ylabels()
     style.legend(drawn, title, list(lines.values()), list(lines))
     return drawn
+
+
+def _widen(axes: Axes) -> None:
+    """Makes the range of a panel as large as SPAN, so that rounding errors are not enlarged."""
+    low, high = axes.get_ylim()
+    if high - low < SPAN:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * SPAN, middle + 0.5 * SPAN)
 
 
 def _shade(axes: Axes, lower: float, upper: float) -> list[Artist]:

@@ -151,6 +151,8 @@ def test_plots_show_every_line():
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["a", "b"]
     close = comparison.cost_time([line("a", 1.30, 11.0), line("b", 1.32, 12.0)], "title").axes[0]
     assert min(len(shown(axis)) for axis in (close.xaxis, close.yaxis)) >= 2
+    exact = [line(name, 1.0 + 1e-6 * k, 25.0 + k, low=None, high=None) for name, k in (("a", 0), ("b", 185))]
+    assert len(shown(comparison.cost_time(exact, "title").axes[0].yaxis)) >= 3
     drawn = comparison.foresight(lines, "title", "policy")
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["policy: a", "policy: b"]
     cells = [line("a", 2.0, None, knowledge=k, drives=d) for k in (0, 1) for d in (0, 1)]

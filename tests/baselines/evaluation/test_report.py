@@ -343,6 +343,13 @@ def test_axes_of_the_joints_have_labels_and_units(quantity):
     assert [axes.get_title(loc="left") for axes in figure.axes] == [*"abcdef", r"\$"]
 
 
+def test_rounding_errors_are_not_enlarged():
+    q = np.full((60, 7), -4.7) + 1e-8 * np.random.default_rng(0).normal(size=(60, 7))
+    for axes in joints.draw("p", log_of(q=q, nominal_q=q), joints.PATHS).axes:
+        low, high = axes.get_ylim()
+        assert high - low == pytest.approx(joints.SPAN)
+
+
 def bands_of(axes):
     """Lower and upper ends of what is shaded across the whole width."""
     boxes = [patch.get_bbox() for patch in axes.patches if (patch.get_x(), patch.get_width()) == (0.0, 1.0)]
