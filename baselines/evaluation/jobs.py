@@ -76,8 +76,7 @@ class Options:
     report: bool = True
     """Write report.html into the folder: table, plots and replays in one page that opens without a network."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
-    """Write the joint motion of each episode into the folder: csv for a table of times, joint coordinates and
-    velocities, joint-trajectory for a ROS 2 message as JSON, mcap for the same in a file of rosbag2."""
+    """Write the joint motion of each episode: csv; joint-trajectory, a ROS 2 message as JSON; mcap, it for rosbag2."""
     accelerations: bool = False
     """Write accelerations into these files, too: controllers then interpolate by quintics, else cubically."""
     noise_seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1

@@ -18,6 +18,8 @@ from ikgym.scenarios import Scenario
 KIND = "trajectory_msgs/msg/JointTrajectory"
 #: Topic of the message in an MCAP file.
 TOPIC = "/joint_trajectory_controller/joint_trajectory"
+#: Fields of a point with one number a joint.
+NUMBERS = ("positions", "velocities", "accelerations", "effort")
 
 
 def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> dict[str, Any]:
@@ -81,7 +83,3 @@ def _typed(types: Any, fields: dict[str, Any]) -> Any:
     ]
     head = header(stamp=stamp(**fields["header"]["stamp"]), frame_id=fields["header"]["frame_id"])
     return types[KIND](header=head, joint_names=fields["joint_names"], points=points)
-
-
-#: Fields of a point with one number a joint.
-NUMBERS = ("positions", "velocities", "accelerations", "effort")
