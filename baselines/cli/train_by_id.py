@@ -27,7 +27,7 @@ class Options:
     total_timesteps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Steps of all arms together; n_timesteps of the settings if left out."""
     minutes: Annotated[float | None, tyro.conf.arg(metavar="X")] = None
-    """CPU time of a run without validations, in place of a number of steps."""
+    """CPU time of a run without validations, after which it ends early."""
     settings: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.yml")] = None
     """Settings in the format of rl-zoo3; the published ones if left out."""
     defaults: bool = False
@@ -40,10 +40,7 @@ class Options:
     """Folder of the runs."""
 
 
-RULES = (
-    Rule(("--total-timesteps",), lambda given: given.minutes is None, "with --minutes"),
-    Rule(("--settings",), lambda given: not given.defaults, "with --defaults"),
-)
+RULES = (Rule(("--settings",), lambda given: not given.defaults, "with --defaults"),)
 
 
 def manual(prog: str) -> str:

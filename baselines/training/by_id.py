@@ -5,6 +5,9 @@ from __future__ import annotations
 import ast
 import csv
 import dataclasses
+import functools
+import math
+import operator
 import pathlib
 import time
 from typing import Any
@@ -18,6 +21,7 @@ from stable_baselines3.common.noise import NormalActionNoise
 
 import ikgym.sb3
 from baselines.files import write_json
+from baselines.training.exporting import ACTIVATIONS
 from baselines.training.trainers.sb3 import ALGORITHMS
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
@@ -25,8 +29,8 @@ from ikgym.validation import FloatArray, known_name, whole_number
 
 #: A file an algorithm, with an entry an environment.
 SETTINGS = pathlib.Path(__file__).parent / "settings"
-#: Steps after which nothing but time ends a training.
-FOREVER = 10**12
+#: Settings that may change during a training: ``lin_0.001`` falls linearly from there to 0.
+SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf", "delta_std")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +42,7 @@ class Training:
         env: The id.
         seed: Of the run.
         total_timesteps: Steps of all arms together; those of the settings if left out.
-        minutes: CPU time of the training without validations, which ends the run as well; None for no limit.
+        minutes: CPU time of the training without validations after which the run ends early; None for no limit.
         settings: A file in the format of rl-zoo3; the published one if left out.
         defaults: Use the defaults of the library and one arm instead.
         validations: Number of validations, evenly spaced.
@@ -66,8 +70,8 @@ class Training:
         out.mkdir(parents=True, exist_ok=True)
         settings = self.read()
         model, steps = self.make(settings), self.total_timesteps or settings["n_timesteps"]
-        curve = Curve(self, steps if self.minutes is None else FOREVER, out / "curve.csv")
-        model.learn(steps if self.minutes is None else FOREVER, callback=curve)
+        curve = Curve(self, steps, out / "curve.csv")
+        model.learn(steps, callback=curve)
         model.save(out / "model.zip")
         score = curve.validate()
         about = {"env": self.env, "algorithm": self.algorithm, "seed": self.seed, "settings": settings}
@@ -100,7 +104,7 @@ class Training:
         Raises:
             InvalidInputError: The algorithm refuses a setting.
         """
-        parameters = {key: _value(value) for key, value in settings.items() if key != "n_timesteps"}
+        parameters = {key: _value(key, value) for key, value in settings.items() if key != "n_timesteps"}
         envs = ikgym.sb3.make_vec(self.env, whole_number("n_envs", parameters.pop("n_envs", 1), at_least=1))
         if parameters.pop("noise_type", None) is not None:
             joints: FloatArray = np.ones(envs.scenario.joints)
@@ -124,16 +128,16 @@ class Curve(BaseCallback):
     def __init__(self, training: Training, steps: int, file: pathlib.Path) -> None:
         super().__init__()
         self._training, self._file, self._rows = training, file, [("core_seconds", "steps", "score")]
-        self._whole = 60.0 * training.minutes if training.minutes else float(steps)
+        self._steps, self._seconds = steps, 60.0 * (training.minutes or math.inf)
         self.spent, self._since = 0.0, time.process_time()
 
     def _on_step(self) -> bool:
         now = time.process_time()
         self.spent, self._since = self.spent + now - self._since, now
-        done = (self.spent if self._training.minutes else self.num_timesteps) / self._whole
+        done = max(self.spent / self._seconds, self.num_timesteps / self._steps)
         if done * self._training.validations >= len(self._rows):
             self.validate()
-        return done < 1.0 or not self._training.minutes
+        return self.spent < self._seconds
 
     def validate(self) -> float:
         """The present score on episodes of the split `validation`, which is written to the file."""
@@ -146,9 +150,28 @@ class Curve(BaseCallback):
         return score
 
 
-def _value(value: Any) -> Any:
-    """A value; rl-zoo3 has Python's ``dict(…)`` as text, which is read as a mapping of literals."""
-    if isinstance(value, str) and value.startswith("dict("):
-        call = ast.parse(value, mode="eval").body
-        return {one.arg: ast.literal_eval(one.value) for one in call.keywords}  # type: ignore[attr-defined]
+def _value(key: str, value: Any) -> Any:
+    """A value as rl-zoo3 reads it: ``lin_…`` is a schedule, and Python's ``dict(…)`` as text is a mapping.
+
+    Raises:
+        InvalidInputError: The text is neither.
+    """
+    if not isinstance(value, str):
+        return value
+    try:
+        if key in SCHEDULED:
+            return functools.partial(operator.mul, float(value.split("lin_")[1]))  # of the share that remains
+        if value.startswith("dict("):
+            call: Any = ast.parse(value, mode="eval").body
+            return {one.arg: _literal(one.value) for one in call.keywords}
+    except (IndexError, SyntaxError, ValueError) as e:
+        raise InvalidInputError(f"settings: expected {key} in the format of rl-zoo3, got {value!r}: {e}") from e
     return value
+
+
+def _literal(node: ast.expr) -> Any:
+    """A literal, or an activation such as ``nn.ReLU``."""
+    if isinstance(node, ast.Attribute):
+        known_name("activation", node.attr, kinds := {kind.__name__: kind for kind in ACTIVATIONS.values()})
+        return kinds[node.attr]
+    return ast.literal_eval(node)

@@ -46,6 +46,36 @@ def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
         assert model.gamma == found["gamma"]
 
 
+def test_settings_are_read_as_rl_zoo3_reads_them():
+    kwargs = "dict(net_arch=[8, 8], activation_fn=nn.ReLU, log_std_init=-1.5)"
+    settings = {"n_steps": 8, "batch_size": 8, "learning_rate": "lin_0.004", "clip_range": "lin_0.2"}
+    model = Training("ppo", TRACK).make({**settings, "policy_kwargs": kwargs})
+    assert model.policy_kwargs == {"net_arch": [8, 8], "activation_fn": torch.nn.ReLU, "log_std_init": -1.5}
+    assert [model.lr_schedule(left) for left in (1.0, 0.25, 0.0)] == [0.004, 0.001, 0.0]
+    assert model.clip_range(0.5) == 0.1
+
+
+def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
+    file = tmp_path / "long.yml"
+    file.write_text(
+        f"{TRACK}: {{n_timesteps: 10000000, n_steps: 16, batch_size: 16, learning_rate: lin_0.001}}\n", encoding="utf-8"
+    )
+    training = Training("ppo", TRACK, minutes=0.02, settings=file, validations=1, episodes=2)
+    about = training.run(tmp_path / "run")
+    assert 0 < about["steps"] < 10_000_000
+    rate = PPO.load(tmp_path / "run" / "model.zip").policy.optimizer.param_groups[0]["lr"]
+    assert 0.0009 < rate <= 0.001
+
+
+@pytest.mark.parametrize("setting", [
+    {"learning_rate": "1e-3"}, {"learning_rate": "lin_fast"}, {"policy_kwargs": "dict(activation_fn=nn.Swish)"},
+    {"policy_kwargs": "dict(activation_fn=eval('1'))"}, {"policy_kwargs": "dict(net_arch="},
+])  # fmt: skip
+def test_other_texts_are_refused(setting):
+    with pytest.raises(IkgymError, match=r"settings: expected|There is no activation|Unknown activation"):
+        Training("ppo", TRACK).make({"n_steps": 8, "batch_size": 8, **setting})
+
+
 @pytest.mark.parametrize(("settings", "algorithm"), [(one, one) for one in SMALL], indirect=["settings"])
 def test_the_first_updates_are_those_of_plain_calls(settings, algorithm, tmp_path):
     Training(algorithm, TRACK, seed=3, settings=settings, validations=1, episodes=2).run(tmp_path / "run")
