@@ -102,8 +102,9 @@ class Task(Wrapping):
         commands: Number of past commands shown.
         share: See :class:`ikgym.rl.ShareAction`.
         radian: Weight of 1 rad in [m], in observation and reward.
-        zero: Distance without reward in [m], also the coarse unit of errors in the observation.
-        fine: Fine unit of errors in the observation, in [m].
+        zero: Distance without reward in [m].
+        coarse: Unit of errors in the observation, in [m].
+        fine: Unit of the hyperbolic tangent of the same, in [m].
         counted: Steps at the end of an episode whose cost is scored; None for all.
     """
 
@@ -113,6 +114,7 @@ class Task(Wrapping):
     share: float = 0.6
     radian: float = 0.3
     zero: float = 0.1
+    coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
 
@@ -121,7 +123,7 @@ class Task(Wrapping):
     def _wrap(self, env: Any, kinds: Any) -> Any:
         env = kinds.ShareAction(env, self.share)
         env = kinds.DistanceReward(env, self.radian, self.zero)
-        return kinds.TrackObservation(env, self.radian, self.zero, self.fine)
+        return kinds.TrackObservation(env, self.radian, self.coarse, self.fine)
 
 
 def make(scenario: str | Scenario, *, render_mode: str | None = None, **changes: Any) -> gym.Env[Any, Any]:

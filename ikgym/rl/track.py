@@ -29,9 +29,8 @@ class TrackStage(Stage):
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}
         scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())
-        home, half = middle(scenario)
         self._fastest = scenario.largest_qdot
-        self._command = scenario.task.kind, scenario.model.chain, scales, home, half, self._fastest
+        self._command = scenario.task.kind, scenario.model.chain, scales, *middle(scenario), self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         self._own = 2 * (scenario.joints + len(env.unwrapped.preview) * int(twist_size(scenario.task.kind)))
         added = spaces.flatdim(spaces.Dict({key: space[key] for key in self._more}))
@@ -87,13 +86,13 @@ class DistanceStage(Stage):
 
 
 def middle(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
-    """Home of an arm, and half of the range of its joints, in [rad] or [m]. Shapes (n,).
+    """Home of an arm, and the unit of its coordinates: 1 rad, or half of the range of a prismatic joint. Shapes (n,).
 
     Raises:
-        InvalidInputError: The arm has no home, or a joint has no limits.
+        InvalidInputError: The arm has no home, or a prismatic joint has no limits.
     """
     arm = scenario.model
-    half = 0.5 * (arm.upper - arm.lower)
-    if arm.home is None or not np.isfinite(half).all():
-        raise InvalidInputError(f"env: expected an arm with a home and limits of all joints, got {arm.name!r}.")
-    return np.array(arm.home), half  # writable, as all that a kernel is compiled for
+    units = np.where(arm.prismatic, 0.5 * (arm.upper - arm.lower), 1.0)
+    if arm.home is None or not np.isfinite(units).all():
+        raise InvalidInputError(f"env: expected an arm with a home and limits of prismatic joints, got {arm.name!r}.")
+    return np.array(arm.home), units  # writable, as all that a kernel is compiled for

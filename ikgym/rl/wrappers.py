@@ -166,7 +166,7 @@ class TrackObservation(ArmWrapper):
 
     | size | feature |
     |---|---|
-    | n | joint coordinates from home, in half of their ranges |
+    | n | joint coordinates from home in [rad], of prismatic joints in half of their ranges |
     | n | joint velocities last applied, as shares of the largest |
     | 2 w each | position and orientation error to the reference at each step ahead that is shown, in units of \
 `coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
@@ -183,10 +183,10 @@ class TrackObservation(ArmWrapper):
         fine: In [m], above 0.
 
     Raises:
-        InvalidInputError: A parameter is out of its range, or the arm has no home or a joint without limits.
+        InvalidInputError: A parameter is out of its range, or the arm has no home or a prismatic joint without limits.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01) -> None:
+    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.03, fine: float = 0.01) -> None:
         stage = TrackStage(env, radian, coarse, fine)
         super().__init__(env, stage, radian=radian, coarse=coarse, fine=fine)
 
