@@ -124,8 +124,7 @@ def picture(lines: Sequence[Line]) -> Figure:
 def main() -> None:
     """Trains what is missing, and writes the files."""
     command = tyro.cli(Command, description=__doc__)
-    lines = from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []
-    kept = {tuple(line[name] for name in RUN): line for line in lines}
+    kept = {tuple(line[name] for name in RUN) for line in _measured()}
     missing = [one for one in command.trainings() if tuple(about(one).values()) not in kept]
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(command.workers, context) as pool:
@@ -135,12 +134,17 @@ def main() -> None:
             jobs[pool.submit(curve, one, command.runs / name / f"seed-{one.seed}")] = about(one)
         for done, job in enumerate(concurrent.futures.as_completed(jobs), 1):
             new = job.result()
-            lines = [line for line in lines if not _same(line, jobs[job])] + new
+            lines = [line for line in _measured() if not _same(line, jobs[job])] + new
             lines.sort(key=lambda line: (*(line[name] for name in RUN if name != "digest"), float(line["steps"])))
             write(CURVES, to_csv(lines).encode())
             print(f"{done} of {len(jobs)}: {' '.join(jobs[job].values())}: {new[-1]['score']}", flush=True)
-    write(TABLE, to_csv(table(lines)).encode())
-    write(PICTURE, style.small_png(picture(lines)))
+    write(TABLE, to_csv(table(_measured())).encode())
+    write(PICTURE, style.small_png(picture(_measured())))
+
+
+def _measured() -> list[Line]:
+    """The lines of the curves; another process may add some."""
+    return from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []  # type: ignore[return-value]
 
 
 def _groups(lines: Sequence[Line]) -> dict[tuple[str, ...], list[Line]]:
