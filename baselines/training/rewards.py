@@ -93,8 +93,9 @@ class Training:
 
     def _export(self, model: BaseAlgorithm, about: dict[str, Any]) -> str:
         """Writes `agent.safetensors`, and returns its hash, or why there is none."""
+        envs: Any = model.get_env()
         try:
-            return export(model, model.get_env(), self.out / "agent.safetensors", about)
+            return export(model, envs, self.out / "agent.safetensors", about)
         except InvalidInputError as e:
             return f"none: {e}"
 

@@ -88,8 +88,8 @@ class Trainer:
 
     def state(self) -> dict[str, Any]:
         """All that later segments depend on: tensors, numbers, strings, and lists and dicts of them."""
-        parts = {"policy": self.policy, "adam": self._adam, "actor": self._actor}
-        weights: dict[str, Any] = {name: copy.deepcopy(part.state_dict()) for name, part in parts.items()}
+        parts: dict[str, Any] = {"policy": self.policy, "adam": self._adam, "actor": self._actor}
+        weights = {name: copy.deepcopy(part.state_dict()) for name, part in parts.items()}
         own = {"steps": self.steps, "updates": self._updates, "far": torch.from_numpy(self._far.copy())}
         return {**weights, **own, "arms": self._arms.state()}
 

@@ -12,7 +12,8 @@ from ikgym.env import RedundantIKEnv
 from ikgym.rl.making import Task
 from ikgym.scenarios import Scenario
 
-Features = Action = npt.NDArray[np.float32]
+Features = npt.NDArray[np.float32]
+Action = npt.NDArray[np.float32]
 
 
 class TaskEnv(gym.Env[Features, Action]):

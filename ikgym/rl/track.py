@@ -26,7 +26,7 @@ OLDEST = 10.0
 class TrackStage(Stage):
     """See :class:`ikgym.rl.TrackObservation`."""
 
-    def __init__(self, env: Any, radian: float, coarse: float, fine: float) -> None:
+    def __init__(self, env: Any, radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01) -> None:
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}
         scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())

@@ -111,7 +111,6 @@ Examples:
   {prog} repeat runs/apg/seed-0/run.json --out runs/again
   {prog} ppo --env ikgym/Track-v0 --minutes 10 --seeds 0 1 2 --out runs/track-ppo
   {prog} sac --env ikgym/Reach-v0 --total-timesteps 100000 --out runs/reach-sac
-  python -m rl_zoo3.train --algo ppo --env ikgym/Track-v0 --gym-packages ikgym -conf ppo.yml    (the same)
 
 Files of a run of ppo, sac or td3, in seed-N:
   model.zip          the model, for Stable-Baselines3
