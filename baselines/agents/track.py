@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -69,14 +70,18 @@ class Track(Processing):
 
     def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
         """See :meth:`Processing.act`."""
-        features, due, largest = np.empty((len(batch.q), self.size(problem))), held.left == 0, problem.largest_qdot
-        seen = batch.q, batch.qdot, batch.pose, batch.nominal
-        scales = self.radian, self.zero, self.fine
-        arm = problem.task.kind, problem.model.chain, scales, *middle(problem.model), largest
-        track_rows(*arm, *seen, features)
+        features, due, arm = np.empty((len(batch.q), network.sizes[0])), held.left == 0, _arm(problem)
+        scales, seen = (self.radian, self.zero, self.fine), (batch.q, batch.qdot, batch.pose, batch.nominal)
+        track_rows(problem.task.kind, problem.model.chain, scales, *arm, *seen, features)
         if due.any():
             held.values[due] = network.forward(features[due].astype(np.float32))
             held.left[due] = interval
         held.left[:] -= 1
-        fractions: FloatArray = held.values * (self.share * largest / problem.velocity_limit)
+        fractions: FloatArray = held.values * (self.share * arm[-1] / problem.velocity_limit)
         return fractions
+
+
+@functools.lru_cache
+def _arm(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where joints are seen from, half of their ranges, and their largest velocities. Shapes (n,)."""
+    return *middle(problem.model), problem.largest_qdot

@@ -185,15 +185,16 @@ def _value(key: str, value: Any) -> Any:
         if key in SCHEDULED:
             return functools.partial(operator.mul, float(value.split("lin_")[1]))  # of the share that remains
         if value.startswith("dict("):
-            call: Any = ast.parse(value, mode="eval").body
-            return {one.arg: _literal(one.value) for one in call.keywords}
+            return _literal(ast.parse(value, mode="eval").body)
     except (IndexError, SyntaxError, ValueError) as e:
         raise InvalidInputError(f"settings: expected {key} in the format of rl-zoo3, got {value!r}: {e}") from e
     return value
 
 
 def _literal(node: ast.expr) -> Any:
-    """A literal, or an activation such as ``nn.ReLU``."""
+    """A literal, an activation such as ``nn.ReLU``, or a ``dict(…)`` of such values."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "dict" and not node.args:
+        return {one.arg: _literal(one.value) for one in node.keywords}
     if isinstance(node, ast.Attribute):
         known_name("activation", node.attr, kinds := {kind.__name__: kind for kind in ACTIVATIONS.values()})
         return kinds[node.attr]

@@ -192,23 +192,27 @@ def parse(arguments: Sequence[str]) -> Command | ByRewards[Any] | Repeat:
         raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got {chosen}.")
     if not chosen.startswith("-"):
         known_name("method", chosen, (*methods.METHODS, "repeat"))
+    by_rewards = chosen in methods.METHODS and chosen != APG.method
+    if by_rewards and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in arguments}:
+        raise InvalidInputError(f"{chosen} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
     preset = _value_of("--preset", arguments) if chosen == APG.method else None
-    default: Any = Command(methods.configure(preset), Options(out=tyro.MISSING))
-    kinds: list[Any] = [Annotated[Repeat, tyro.conf.subcommand("repeat")]]
-    for name, kind in reversed(methods.METHODS.items()):
-        about = (inspect.getdoc(kind) or "").partition("\n\nRaises:")[0]
-        generic: Any = ByRewards
-        if kind is APG:
-            kinds.insert(0, Annotated[Command, tyro.conf.subcommand(name, default=default, description=about)])
-        else:
-            kinds.insert(0, Annotated[generic[kind], tyro.conf.subcommand(name, description=about)])
-            if chosen == name and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in arguments}:
-                raise InvalidInputError(f"{name} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
+    kinds = [_subcommand(kind, preset) for kind in methods.METHODS.values()]
+    kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
     command: Command | ByRewards[Any] | Repeat = parse_options(
         any_of_them, arguments, prog=_program(), description=manual(), rules=RULES
     )
     return command
+
+
+def _subcommand(kind: type[APG | Rewards], preset: str | None) -> Any:
+    """The command of a method; options of apg that are left out are those of the preset."""
+    about = (inspect.getdoc(kind) or "").partition("\n\nRaises:")[0]
+    if kind is APG:
+        default: Any = Command(methods.configure(preset), Options(out=tyro.MISSING))
+        return Annotated[Command, tyro.conf.subcommand(kind.method, default=default, description=about)]
+    generic: Any = ByRewards
+    return Annotated[generic[kind], tyro.conf.subcommand(kind.method, description=about)]
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str | None:

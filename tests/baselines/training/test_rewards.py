@@ -51,10 +51,14 @@ def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
 
 
 def test_settings_are_read_as_rl_zoo3_reads_them():
-    kwargs = "dict(net_arch=[8, 8], activation_fn=nn.ReLU, log_std_init=-1.5)"
+    kwargs = "dict(net_arch=dict(pi=[8], vf=[9]), activation_fn=nn.ReLU, log_std_init=-1.5)"
     settings = {"n_steps": 8, "batch_size": 8, "learning_rate": "lin_0.004", "clip_range": "lin_0.2"}
     model = make(options("ppo"), {**settings, "policy_kwargs": kwargs})
-    assert model.policy_kwargs == {"net_arch": [8, 8], "activation_fn": torch.nn.ReLU, "log_std_init": -1.5}
+    assert model.policy_kwargs == {
+        "net_arch": {"pi": [8], "vf": [9]},
+        "activation_fn": torch.nn.ReLU,
+        "log_std_init": -1.5,
+    }
     assert [model.lr_schedule(left) for left in (1.0, 0.25, 0.0)] == [0.004, 0.001, 0.0]
     assert model.clip_range(0.5) == 0.1
 
@@ -70,8 +74,13 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
 
 
 @pytest.mark.parametrize("setting", [
-    {"learning_rate": "1e-3"}, {"learning_rate": "lin_fast"}, {"policy_kwargs": "dict(activation_fn=nn.Swish)"},
-    {"policy_kwargs": "dict(activation_fn=eval('1'))"}, {"policy_kwargs": "dict(net_arch="},
+    {"learning_rate": "1e-3"},
+    {"learning_rate": "lin_fast"},
+    {"policy_kwargs": "dict(activation_fn=nn.Swish)"},
+    {"policy_kwargs": "dict(activation_fn=eval('1'))"},
+    {"policy_kwargs": "dict(net_arch="},
+    {"policy_kwargs": "dict([8])"},
+    {"policy_kwargs": "dict(a=1).pop('a')"},
 ])  # fmt: skip
 def test_other_texts_are_refused(setting):
     with pytest.raises(IkgymError, match=r"settings: expected|There is no activation|Unknown activation"):
