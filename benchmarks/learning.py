@@ -26,8 +26,7 @@ from matplotlib.figure import Figure
 from baselines.evaluation.plots import style
 from baselines.evaluation.records import from_csv, to_csv
 from baselines.files import write
-from baselines.training.by_id import Training
-from baselines.training.trainers.sb3 import ALGORITHMS
+from baselines.training.rewards import ALGORITHMS, Training
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
