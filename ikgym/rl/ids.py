@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.env import RedundantIKEnv
+from ikgym.exceptions import UnexpectedArgumentError, UnknownNameError
 from ikgym.rl.making import Task
 from ikgym.rl.view import Features
 from ikgym.scenarios import Scenario
@@ -24,7 +25,7 @@ class TaskEnv(gym.Env[Features, Action]):
         changes: Fields of :class:`ikgym.rl.Task` that differ from those of the id, for ablations.
 
     Raises:
-        UnknownNameError: There is no such field.
+        UnexpectedArgumentError: There is no such field.
         InvalidInputError: A value is refused.
     """
 
@@ -35,7 +36,7 @@ class TaskEnv(gym.Env[Features, Action]):
     metadata: ClassVar[dict[str, Any]] = {**RedundantIKEnv.metadata, "render_fps": 100}  # type: ignore[misc]
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
-        task = self.task.replace(**changes)
+        task = self._changed(changes)
         self._env = task.arm(task.scenario, render_mode=render_mode)
         self.render_mode = render_mode
         self.observation_space, self.action_space = self._env.observation_space, self._env.action_space
@@ -51,8 +52,15 @@ class TaskEnv(gym.Env[Features, Action]):
                 for one arm.
         """
         own = {name: options.pop(name) for name in ("autoreset_mode", "max_episode_steps") if name in options}
-        task = cls.task.replace(**options)
+        task = cls._changed(options)
         return task.arms(task.scenario, num_envs, render_mode=render_mode, **own)
+
+    @classmethod
+    def _changed(cls, changes: dict[str, Any]) -> Task:
+        try:
+            return cls.task.replace(**changes)
+        except UnknownNameError as e:
+            raise UnexpectedArgumentError(f"got an unexpected keyword argument {e.name!r}. {e}") from None
 
     @property
     def scenario(self) -> Scenario:
