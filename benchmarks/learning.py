@@ -26,11 +26,13 @@ from matplotlib.figure import Figure
 from baselines.evaluation.plots import style
 from baselines.evaluation.records import from_csv, to_csv
 from baselines.files import write
-from baselines.training.rewards import ALGORITHMS, Training
+from baselines.training.config import PPO, SAC, TD3, Rewards
+from baselines.training.rewards import ALGORITHMS, Training, read
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
 CURVES, TABLE, PICTURE = DOCS / "results/learning_runs.csv", DOCS / "results/learning.csv", DOCS / "images/learning.png"
+CONFIGS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3)}
 #: What one training is known by, and what a line of the table is about.
 RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("environment", "algorithm", "settings")
 #: Episodes of the split `test`.
@@ -59,27 +61,28 @@ class Command:
 
     def trainings(self) -> list[Training]:
         """All of them, the first seeds first."""
-        minutes = MINUTES if self.defaults else None
-        return [
-            Training(algorithm, env, seed, minutes=minutes, defaults=self.defaults)
-            for seed, env, algorithm in itertools.product(self.seeds, self.environments, self.algorithms)
-        ]
+        minutes, out = MINUTES if self.defaults else None, []
+        for seed, env, algorithm in itertools.product(self.seeds, self.environments, self.algorithms):
+            folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
+            out.append(Training(CONFIGS[algorithm](env=env, minutes=minutes, defaults=self.defaults), seed, folder))
+        return out
 
 
 def about(training: Training) -> Line:
     """What a training is known by."""
-    digest = hashlib.sha256(json.dumps(training.read(), sort_keys=True).encode()).hexdigest()[:8]
-    kind = "defaults" if training.defaults else "published"
-    return dict(zip(RUN, (training.env, training.algorithm, kind, digest, str(training.seed)), strict=True))
+    config = training.config
+    digest = hashlib.sha256(json.dumps(read(config), sort_keys=True).encode()).hexdigest()[:8]
+    kind = "defaults" if config.defaults else "published"
+    return dict(zip(RUN, (config.env, config.method, kind, digest, str(training.seed)), strict=True))
 
 
-def curve(training: Training, folder: Path) -> list[Line]:
+def curve(training: Training) -> list[Line]:
     """Trains, and gives the lines of the curve; the last one has the test."""
-    training.run(folder)
-    with (folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
+    training.run()
+    with (training.out / "curve.csv").open(encoding="utf-8", newline="") as stream:
         lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in csv.DictReader(stream)]
-    model = ALGORITHMS[training.algorithm].load(folder / "model.zip", device="cpu")
-    cost = rl.costs(model, training.env, split="test", episodes=EPISODES)
+    model = ALGORITHMS[training.config.method].load(training.out / "model.zip", device="cpu")
+    cost = rl.costs(model, training.config.env, split="test", episodes=EPISODES)
     lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
     return lines
 
@@ -127,10 +130,7 @@ def main() -> None:
     missing = [one for one in command.trainings() if tuple(about(one).values()) not in kept]
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(command.workers, context) as pool:
-        jobs = {}
-        for one in missing:
-            name = f"{one.env.split('/')[1]}-{one.algorithm}{'-defaults' * one.defaults}"
-            jobs[pool.submit(curve, one, command.runs / name / f"seed-{one.seed}")] = about(one)
+        jobs = {pool.submit(curve, one): about(one) for one in missing}
         for done, job in enumerate(concurrent.futures.as_completed(jobs), 1):
             new = job.result()
             lines = [line for line in _measured() if not _same(line, jobs[job])] + new
@@ -143,7 +143,7 @@ def main() -> None:
 
 def _measured() -> list[Line]:
     """The lines of the curves; another process may add some."""
-    return from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []  # type: ignore[return-value]
+    return from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []
 
 
 def _groups(lines: Sequence[Line]) -> dict[tuple[str, ...], list[Line]]:

@@ -2,20 +2,21 @@
 
 For each environment by id: an arm that stands still; `dls` with the best gain and damping on episodes of the split
 `validation`; and the least cost of an episode that any of some policies reaches, which on a plant are told how the arm
-deviates and have exact sensors without delay.
+deviates and have exact sensors without delay. The reward threshold of an id is the return of `dls` that is damped until
+its score is 0.8.
 """
 
 from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 import baselines
-from baselines.episodes import rollout, rollouts
+from baselines.episodes import Episode, rollout, rollouts
 from baselines.spec import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import FILE
@@ -27,6 +28,8 @@ EPISODES = 64
 GAINS, DAMPINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0), (1e-3, 1e-2, 0.03, 0.1)
 #: Policies one of which has the best cost of an episode.
 BEST = ("rhc_foresight", "rhc:horizon=8")
+#: Score at the reward threshold, and dampings of `dls` on both sides of it.
+SOLVED, DAMPED = 0.8, (0.03, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 
 
 class Still:
@@ -47,8 +50,22 @@ def counted(scenario: Scenario, policy: str, seeds: Sequence[int], steps: int | 
         ]
     else:
         episodes = rollouts(scenario, baselines.make(name, scenario, **parameters), seeds)
-    first = 0 if steps is None else scenario.steps - steps
-    return np.log1p([(one.tracking_cost + one.velocity_cost)[first:].sum() for one in episodes])
+    return logarithms(episodes, steps)
+
+
+def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
+    """Logarithms of 1 + cost of the last steps of episodes, None for all of them. Shape (episodes,)."""
+    return np.log1p([(one.tracking_cost + one.velocity_cost)[-(steps or 0) :].sum() for one in episodes])
+
+
+def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:
+    """Sums of the rewards of whole episodes, see :class:`ikgym.rl.DistanceReward`. Shape (episodes,)."""
+    costs = [
+        1e6 * (one.position_error**2 + (task.radian * one.orientation_error) ** 2) + one.velocity_cost
+        for one in episodes
+    ]
+    total: FloatArray = (1.0 - np.log1p(costs) / np.log1p(1e6 * task.zero**2)).sum(axis=1)
+    return total
 
 
 def informed(scenario: Scenario, policy: str) -> tuple[Scenario, str]:
@@ -81,15 +98,29 @@ def measured(name: str, split: str, dls: str) -> dict[str, float]:
     return {name: round(value, 6) for name, value in {**means, "best": float(least.mean())}.items()}
 
 
+def threshold(name: str, dls: str, own: Mapping[str, float]) -> float:
+    """The mean return of `dls` in an environment with the damping that takes its score down to 0.8."""
+    task, seeds, points = rl.IDS[name].task, scenarios.seeds("validation", EPISODES), []
+    scenario, (solver, parameters) = scenarios.get(task.scenario), parse_policy(dls)
+    for damping in DAMPED:
+        policy = baselines.make(solver, scenario, **{**parameters, "damping": damping})
+        episodes = rollouts(scenario, policy, seeds)
+        score = (own["still"] - logarithms(episodes, task.counted).mean()) / (own["still"] - own["dls"])
+        points.append((float(score), float(returns(task, episodes).mean())))
+    scores, means = np.array(sorted(points)).T
+    return round(float(np.interp(SOLVED, scores, means)), 6)
+
+
 def main() -> None:
     """Measures all of them and writes the file."""
-    out: dict[str, Any] = {"dls_settings": {}, "validation": {}, "test": {}}
+    out: dict[str, Any] = {"dls_settings": {}, "validation": {}, "test": {}, "thresholds": {}}
     for name, kind in rl.IDS.items():
         dls = tuned(scenarios.find(kind.task.scenario), kind.task.counted)
         out["dls_settings"][name] = dls
         for split in ("validation", "test"):
             out[split][name] = measured(name, split, dls)
             print(name, split, dls, out[split][name], flush=True)
+        out["thresholds"][name] = threshold(name, dls, out["validation"][name])
     FILE.write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
 
 

@@ -35,6 +35,10 @@ class UnknownNameError(IkgymError, LookupError):
         return type(self), (self.kind, self.name, self.available)
 
 
+class UnexpectedArgumentError(IkgymError, TypeError):
+    """A keyword that an environment does not take, as Python calls it: TorchRL tries keywords until none is refused."""
+
+
 class NoAttributeError(IkgymError, AttributeError):
     """A row of a vector environment has no such attribute."""
 

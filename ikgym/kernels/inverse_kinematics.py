@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.kernels.random_numbers import uniform
@@ -136,13 +136,13 @@ def inverse_rows(
         converged[row] = _inverse(chain, ranges, (rotation[row], position[row]), start[row], settings, work, q[row])
 
 
-@inner
+@uncounted
 def _inverse(chain, ranges, pose, start, settings, work, q):
     """The posture for one pose into ``q``; returns whether it meets the pose."""
     best = math.inf
     for attempt in range(settings.restarts + 1):
         if attempt == 0:
-            work.q[:] = start
+            _copy(start, work.q)
         else:
             _draw(ranges, settings.key, attempt, work.q)
         _descend(chain, ranges, pose, settings, work)
@@ -152,13 +152,13 @@ def _inverse(chain, ranges, pose, start, settings, work, q):
         error = _squared(work.error)
         if error < best:
             best = error
-            q[:] = work.q
+            _copy(work.q, q)
         if _met(work.error, settings):
             return True
     return False
 
 
-@kernel
+@inlined
 def _draw(ranges, key, attempt, q):
     """The random posture of an attempt."""
     n = q.shape[0]
@@ -167,7 +167,7 @@ def _draw(ranges, key, attempt, q):
         q[j] = min(max(ranges.first[j] + share * (ranges.last[j] - ranges.first[j]), ranges.lower[j]), ranges.upper[j])
 
 
-@kernel
+@uncounted
 def _descend(chain, ranges, pose, settings, work):
     """Steps from ``work.q`` until the pose is met or nothing is gained any more; leaves the error where it ends."""
     milestone, waited = math.inf, 0
@@ -188,14 +188,14 @@ def _descend(chain, ranges, pose, settings, work):
         _step(ranges, DAMPING * error + SMALLEST_DAMPING * settings.length * settings.length, work)
 
 
-@kernel
+@uncounted
 def _step(ranges, damping, work):
     """A step of ``work.q`` within the limits."""
     for _ in range(work.q.shape[0]):
         _gram(damping, work)
         if not cholesky(work.gram):
             return
-        work.weights[:] = work.error
+        _copy(work.error, work.weights)
         cholesky_solve(work.gram, work.weights)
         if not _hold(ranges, work):
             break
@@ -203,7 +203,7 @@ def _step(ranges, damping, work):
         work.q[j] += work.step[j]
 
 
-@inner
+@inlined
 def _gram(damping, work):
     """J Jᵀ + λ, its lower triangle."""
     jacobian, gram = work.jacobian, work.gram
@@ -215,7 +215,7 @@ def _gram(damping, work):
             gram[i, k] = total
 
 
-@inner
+@inlined
 def _hold(ranges, work):
     """Takes the joints that would pass a limit to it, and their part off the error; returns whether there are any."""
     q, step, jacobian = work.q, work.step, work.jacobian
@@ -235,7 +235,7 @@ def _hold(ranges, work):
     return passed
 
 
-@inner
+@inlined
 def _unwind(prismatic, ranges, start, q):
     """Takes full turns off the joints, as the limits allow, so that they end near the start; whether it took any."""
     turn, unwound = 2.0 * math.pi, False
@@ -250,7 +250,7 @@ def _unwind(prismatic, ranges, start, q):
     return unwound
 
 
-@kernel
+@inlined
 def _error(pose, length, work):
     """The error of ``work.rotation`` and ``work.position``."""
     rotation, position = pose
@@ -266,7 +266,7 @@ def _error(pose, length, work):
     error[3], error[4], error[5] = factor * x, factor * y, factor * z
 
 
-@kernel
+@inlined
 def _row(row, rotation):
     """A row of a matrix times the transpose of a rotation."""
     return (
@@ -276,7 +276,7 @@ def _row(row, rotation):
     )
 
 
-@inner
+@inlined
 def _met(error, settings):
     """Whether position and orientation both are within the tolerance."""
     most = settings.tolerance * settings.tolerance
@@ -288,7 +288,13 @@ def _met(error, settings):
     return angle <= most * settings.length * settings.length
 
 
-@inner
+@inlined
+def _copy(vector, out):
+    for i in range(out.shape[0]):
+        out[i] = vector[i]
+
+
+@inlined
 def _squared(vector):
     total = 0.0
     for i in range(vector.shape[0]):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.random_numbers import normal, share, stream
 
 Floats = npt.NDArray[np.float64]
@@ -70,30 +70,51 @@ def draw_arms(spread, keys, rows, arms):
         rows: Which rows they are. Shape (k,).
         arms: An :class:`Arms`, which receives them.
     """
-    n = spread.prismatic.shape[0]
-    turned, payload = np.empty((3, 3)), np.any(spread.payload)
+    payload = np.any(spread.payload)
     for i in range(keys.shape[0]):
-        key, row = keys[i], rows[i]
-        which = int(share(stream(key, WHICH), np.uint64(0)) * spread.offsets.shape[0])
-        for loaded in range(2 if payload else 1):
-            offsets, axes = arms.offsets[row, loaded], arms.axes[row, loaded]
-            tool, tool_rotation = arms.tool[row, loaded], arms.tool_rotation[row, loaded]
-            for j in range(n):
-                _shift(stream(key, LINK), j, spread.link, spread.offsets[which, j], offsets[j])
-                _tilt(stream(key, AXIS), j, spread.axis, spread.axes[which, j], axes[j])
-            _shift(stream(key, LINK), n, spread.link, spread.tool[which], tool)
-            tool_rotation[:] = spread.tool_rotation[which]
-            for j in range(n):
-                zero = 0.0
-                if spread.zero[j] != 0.0:
-                    zero = spread.zero[j] * normal(stream(key, ZERO), np.uint64(j))
-                if loaded == 1:
-                    zero += spread.payload[j]
-                if zero != 0.0:
-                    _begin_at(j, zero, spread.prismatic, offsets, axes, tool, tool_rotation, turned)
-        if not payload:
-            arms.offsets[row, 1], arms.axes[row, 1] = arms.offsets[row, 0], arms.axes[row, 0]
-            arms.tool[row, 1], arms.tool_rotation[row, 1] = arms.tool[row, 0], arms.tool_rotation[row, 0]
+        _draw_arm(spread, keys[i], rows[i], 0, arms)
+        if payload:
+            _draw_arm(spread, keys[i], rows[i], 1, arms)
+        else:
+            _copy_arm(rows[i], arms)
+
+
+@uncounted
+def _draw_arm(spread, key, row, loaded, arms):
+    """The arm of a row, without its payload or with it."""
+    offsets, axes = arms.offsets[row, loaded], arms.axes[row, loaded]
+    tool, tool_rotation = arms.tool[row, loaded], arms.tool_rotation[row, loaded]
+    n, of_links, of_axes, of_zeros = spread.prismatic.shape[0], stream(key, LINK), stream(key, AXIS), stream(key, ZERO)
+    which = int(share(stream(key, WHICH), np.uint64(0)) * spread.offsets.shape[0])
+    for j in range(n):
+        _shift(of_links, j, spread.link, spread.offsets[which, j], offsets[j])
+        _tilt(of_axes, j, spread.axis, spread.axes[which, j], axes[j])
+    _shift(of_links, n, spread.link, spread.tool[which], tool)
+    _copy(spread.tool_rotation[which], tool_rotation)
+    for j in range(n):
+        zero = 0.0
+        if spread.zero[j] != 0.0:
+            zero = spread.zero[j] * normal(of_zeros, np.uint64(j))
+        if loaded == 1:
+            zero += spread.payload[j]
+        if zero != 0.0:
+            _begin_at(j, zero, spread.prismatic, offsets, axes, tool, tool_rotation)
+
+
+@inlined
+def _copy_arm(row, arms):
+    """The arm of a row with a payload, where there is none."""
+    _copy(arms.offsets[row, 0], arms.offsets[row, 1])
+    _copy(arms.axes[row, 0], arms.axes[row, 1])
+    _copy(arms.tool[row, :1], arms.tool[row, 1:])
+    _copy(arms.tool_rotation[row, 0], arms.tool_rotation[row, 1])
+
+
+@inlined
+def _copy(vectors, out):
+    for i in range(out.shape[0]):
+        for c in range(3):
+            out[i, c] = vectors[i, c]
 
 
 @kernel
@@ -161,37 +182,34 @@ def _to_unit(vector):
         vector[c] /= length
 
 
-@inner
-def _begin_at(j, zero, prismatic, offsets, axes, tool, tool_rotation, turned):
+@inlined
+def _begin_at(j, zero, prismatic, offsets, axes, tool, tool_rotation):
     """Makes a chain have a joint's coordinate ``zero`` where the joint's encoder says 0.
 
     Rot(a, q + z) = Rot(a, q) Rot(a, z): what follows the joint is turned by its zero, and all link frames are parallel
     to the base at q = 0 again.
     """
-    axis = axes[j]
+    axis = axes[j, 0], axes[j, 1], axes[j, 2]
     if prismatic[j]:
         for c in range(3):
             offsets[j, c] += zero * axis[c]
         return
+    s, half = math.sin(zero), math.sin(0.5 * zero)
+    v = 2.0 * half * half
     for i in range(j + 1, offsets.shape[0]):
-        _turn(axis, zero, offsets[i])
-        _turn(axis, zero, axes[i])
+        _turn(axis, s, v, offsets[i])
+        _turn(axis, s, v, axes[i])
         _to_unit(axes[i])
-    _turn(axis, zero, tool)
+    _turn(axis, s, v, tool)
     for c in range(3):
-        turned[c] = tool_rotation[:, c]
-        _turn(axis, zero, turned[c])
-    for c in range(3):
-        tool_rotation[:, c] = turned[c]
+        _turn(axis, s, v, tool_rotation[:, c])
 
 
 @inlined
-def _turn(axis, angle, vector):
-    """Turns a vector in place, by Rodrigues' formula."""
-    s, half = math.sin(angle), math.sin(0.5 * angle)
-    v = 2.0 * half * half
+def _turn(axis, s, v, vector):
+    """Turns a vector in place, by Rodrigues' formula with the sine and 1 − the cosine of the angle."""
     x, y, z = vector[0], vector[1], vector[2]
-    ax, ay, az = axis[0], axis[1], axis[2]
+    ax, ay, az = axis
     cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
     vector[0] = x + s * cx + v * (ay * cz - az * cy)
     vector[1] = y + s * cy + v * (az * cx - ax * cz)

@@ -100,7 +100,11 @@ class Draws:
 
 def episode_key(plant: Plant, generator: np.random.Generator) -> int:
     """The key from which an episode's plant is drawn; an ideal plant does not touch the generator."""
-    return 0 if plant.ideal else int(generator.integers(2**63, dtype=np.uint64))
+    if plant.ideal:
+        return 0
+    if isinstance(generator.bit_generator, np.random.PCG64):  # Gymnasium's: the same bits in a tenth of the time
+        return int(generator.bit_generator.random_raw()) >> 1
+    return int(generator.integers(2**63, dtype=np.uint64))
 
 
 def arm_key(arm_seed: Any) -> int:

@@ -119,8 +119,10 @@ class PlantRows:
             noise_seeds: One a row, for the noise of drives and sensors; 0 is the noise of the episode.
         """
         keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
-        given = [None if arm_seeds is None else arm_seeds[row] for row in rows.tolist()]
-        arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, given, strict=True)]
+        arm_keys = keys
+        if arm_seeds is not None:
+            kept = [arm_seeds[row] for row in rows.tolist()]
+            arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, kept, strict=True)]
         of_arms = np.array(arm_keys, dtype=np.uint64)
         self._draws.arms(of_arms, rows, self.arms)
         bandwidths, self.state.delay[rows] = self._draws.loops(of_arms)

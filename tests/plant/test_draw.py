@@ -6,7 +6,7 @@ import pytest
 import ikgym
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
-from ikgym.plant.draw import Draws
+from ikgym.plant.draw import Draws, episode_key
 from tests.comparison import identical
 from tests.plant.effects import ALL, panda
 
@@ -26,6 +26,15 @@ def arms(plant, arm=PANDA):
 def close(numbers, deviation):
     """Whether a mean of 0 and a standard deviation are met, as nearly as so many numbers can tell."""
     return abs(numbers.mean()) < 0.1 * deviation and abs(numbers.std() / deviation - 1.0) < 0.06
+
+
+@pytest.mark.parametrize("kind", [np.random.PCG64, np.random.MT19937])
+def test_the_key_of_an_episode_is_that_of_numpy(kind):
+    """It draws the same 63 bits, and leaves the generator where that does."""
+    ours, theirs = np.random.Generator(kind(7)), np.random.Generator(kind(7))
+    for _ in range(20):
+        assert episode_key(Plant(zero=0.01), ours) == theirs.integers(2**63, dtype=np.uint64)
+    assert ours.random() == theirs.random()
 
 
 def test_zeros_shift_joints():

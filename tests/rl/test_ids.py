@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import itertools
 import pickle
@@ -11,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.env_util import make_vec_env
@@ -28,6 +29,9 @@ N = 3
 SIZES = {"Reach": 26, "Track": 38, "Fast": 38, "Limits": 38, "Camera": 272, "Payload": 272}
 
 every_id = pytest.mark.parametrize("name", IDS)
+one_id_at_least = pytest.mark.parametrize(
+    "name", [name if "Track" in name else pytest.param(name, marks=pytest.mark.slow) for name in IDS]
+)
 
 
 def actions_of(env, steps, seed=0):
@@ -179,11 +183,10 @@ def test_pickled_in_mid_episode_it_goes_on_as_before(name):
     assert same_bits(env.reset()[0], again.reset()[0])
 
 
-def test_wrappers_of_gymnasium(tmp_path):
-    pytest.importorskip("moviepy")
-    env = RecordEpisodeStatistics(TimeLimit(gym.make("ikgym/Track-v0", render_mode="rgb_array"), 4))
-    videos = {"episode_trigger": lambda _: True, "disable_logger": True}
-    env = NormalizeObservation(RecordVideo(env, str(tmp_path / "videos"), **videos))
+@every_id
+def test_wrappers_of_gymnasium(name):
+    env = gym.make(name, lost_distance=None)
+    env = NormalizeObservation(RecordEpisodeStatistics(TimeLimit(env, 4)))
     env.reset(seed=0)
     rewards = []
     for action in actions_of(env, 4):
@@ -192,10 +195,41 @@ def test_wrappers_of_gymnasium(tmp_path):
     assert truncated
     assert not terminated
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
-    assert seen.shape == (SIZES["Track"],)
+    assert seen.shape == env.unwrapped.observation_space.shape
     assert np.abs(seen).max() < 10.0
+
+
+@one_id_at_least
+def test_an_episode_is_recorded(name, tmp_path):
+    pytest.importorskip("moviepy")
+    env = TimeLimit(gym.make(name, render_mode="rgb_array"), 4)
+    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
+    env.reset(seed=0)
+    for action in actions_of(env, 4):
+        env.step(action)
     env.close()
     assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
+
+
+@every_id
+def test_torchrl_takes_it(name):
+    check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
+    from torchrl.envs import GymEnv, GymWrapper
+
+    check_env_specs(GymEnv(name))
+    check_env_specs(GymWrapper(gym.make_vec(name, 2, autoreset_mode="SameStep")))
+
+
+@one_id_at_least
+def test_spawned_workers_return_what_one_process_does(name):
+    makers = [functools.partial(gym.make, f"ikgym:{name}")] * 2
+    ours, theirs = AsyncVectorEnv(makers, context="spawn"), SyncVectorEnv(makers)
+    try:
+        assert same_bits(ours.reset(seed=4)[0], theirs.reset(seed=4)[0])
+        for actions in actions_of(theirs, 3):
+            assert same_bits(ours.step(actions)[:4], theirs.step(actions)[:4])
+    finally:
+        ours.close()
 
 
 def test_fields_of_the_task_can_be_changed():
@@ -203,8 +237,10 @@ def test_fields_of_the_task_can_be_changed():
     assert env.observation_space.shape == (2 * SIZES["Track"],)
     assert gym.make(env.spec).observation_space == env.observation_space
     assert gym.make_vec("ikgym/Track-v0", 2, history=2).single_observation_space == env.observation_space
-    with pytest.raises(IkgymError, match="Did you mean 'history'"):
-        gym.make("ikgym/Track-v0", histroy=2)
+    for make in (gym.make, gym.make_vec):
+        with pytest.raises(IkgymError, match="Did you mean 'history'") as refused:
+            make("ikgym/Track-v0", histroy=2)
+        assert isinstance(refused.value, TypeError)  # as other libraries expect who try keywords
 
 
 def test_importing_again_registers_nothing_twice():

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from types import SimpleNamespace
+
+import gymnasium as gym
 import numpy as np
 import pytest
 
 import baselines
 import ikgym
 from baselines.episodes import play, rollouts
-from benchmarks.yardsticks import Still, counted
+from benchmarks.yardsticks import Still, counted, returns
 from ikgym import rl, scenarios
 from ikgym.exceptions import IkgymError
-from ikgym.rl.scoring import interquartile_mean, yardsticks
+from ikgym.rl.scoring import FILE, interquartile_mean, yardsticks
 
 TRACK = "ikgym/Track-v0"
 
@@ -45,6 +49,25 @@ def test_yardsticks_stand_in_their_order(name):
         assert own["best"] <= own["dls"] < own["still"]
 
 
+@pytest.mark.parametrize("name", rl.IDS)
+def test_reward_thresholds_are_measured_returns(name):
+    measured = json.loads(FILE.read_text())["thresholds"][name]
+    assert gym.spec(name).reward_threshold == pytest.approx(measured, abs=2.5)
+
+
+@pytest.mark.parametrize("name", [TRACK, "ikgym/Payload-v0"])
+def test_returns_of_yardsticks_are_those_of_the_environment(name):
+    env, told, total = gym.make(name, lost_distance=None), [], 0.0
+    env.reset(seed=1)
+    for _ in range(20):
+        _, reward, _, _, info = env.step(np.full(7, 0.1, dtype=np.float32))
+        total += reward
+        told.append([info[key] for key in ("position_error", "orientation_error", "velocity_cost")])
+    position, orientation, velocity = np.transpose(told)
+    episode = SimpleNamespace(position_error=position, orientation_error=orientation, velocity_cost=velocity)
+    assert returns(env.unwrapped.task, [episode]) == pytest.approx([total], rel=1e-12)
+
+
 @pytest.mark.parametrize("name", [TRACK, "ikgym/Reach-v0"])
 def test_an_arm_that_stands_still_costs_what_the_benchmark_says(name):
     task = rl.IDS[name].task
@@ -74,7 +97,8 @@ def test_wrong_results_are_refused(results, message):
 
 
 def test_wrong_names_are_refused():
-    with pytest.raises(IkgymError, match="validation"):
-        rl.score({TRACK: [[1.0]]}, "train")
+    for split in ("train", "thresholds"):
+        with pytest.raises(IkgymError, match="Available: validation, test"):
+            rl.score({TRACK: [[1.0]]}, split)
     with pytest.raises(IkgymError, match="Did you mean"):
         ikgym.rl.costs(Still(), "ikgym/Reach-v1")
