@@ -1,5 +1,6 @@
 """Every example runs."""
 
+import importlib.util
 import re
 import runpy
 from pathlib import Path
@@ -11,12 +12,21 @@ import torch
 ROOT = Path(__file__).parents[1] / "examples"
 EXAMPLES = sorted(ROOT.glob("[0-9]*.py"))
 
+# TorchRL is in no extra, and warns of what is old in itself.
+TORCHRL = [
+    pytest.mark.skipif(importlib.util.find_spec("torchrl") is None, reason="no TorchRL: pip install torchrl"),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning"),
+]
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+
+def marked(example):
+    """An example, skipped where its library is missing."""
+    return pytest.param(example, marks=TORCHRL if Path(example).stem == "10_torchrl" else ())
+
+
+@pytest.mark.parametrize("example", [marked(one) for one in EXAMPLES], ids=lambda path: path.stem)
 def test_example(example, capsys, tmp_path):
     video = tmp_path / "video.mp4"
-    if example.stem == "10_torchrl":
-        pytest.importorskip("torchrl")
     small = {
         "04_video": (video, 40),
         "06_ppo": (1,),
@@ -52,11 +62,9 @@ def test_an_advantage_is_what_a_step_gains_over_the_value():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("example", ["06_ppo", "10_torchrl"])
+@pytest.mark.parametrize("example", [marked("06_ppo"), marked("10_torchrl")])
 def test_agents_of_examples_learn(example, capsys):
     """Without training the score is 0 to 0.02, after 60 of 240 updates 0.1 to 0.2."""
-    if example == "10_torchrl":
-        pytest.importorskip("torchrl")
     score = runpy.run_path(str(ROOT / f"{example}.py"))["main"](60)
     capsys.readouterr()
     assert score > 0.08
