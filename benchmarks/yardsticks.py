@@ -78,7 +78,7 @@ def measured(name: str, split: str, dls: str) -> dict[str, float]:
     for policy in (dls, *BEST):
         plant, told = informed(scenario, policy)
         least = np.minimum(least, counted(plant, told, seeds, task.counted))
-    return {**means, "best": float(least.mean())}
+    return {name: round(value, 6) for name, value in {**means, "best": float(least.mean())}.items()}
 
 
 def main() -> None:

@@ -27,8 +27,8 @@ class Track(Processing):
         ahead: Times ahead at which the reference is seen, in [s], rising.
         share: Share of the largest joint velocities that an output of 1 means, above 0.
         radian: Weight of 1 rad in [m], above 0.
-        zero: Coarse unit of errors in [m], above 0.
-        fine: Fine unit of errors in [m], above 0.
+        coarse: Unit of errors in [m], above 0.
+        fine: Unit of the hyperbolic tangent of the same, in [m], above 0.
 
     Raises:
         InvalidInputError: A value is out of its range.
@@ -37,7 +37,7 @@ class Track(Processing):
     ahead: tuple[float, ...]
     share: float = 1.0
     radian: float = 0.3
-    zero: float = 0.1
+    coarse: float = 0.03
     fine: float = 0.01
 
     kind: ClassVar[str] = "track"
@@ -48,7 +48,7 @@ class Track(Processing):
 
     def __post_init__(self) -> None:
         steps_ahead(self.ahead, 1.0)
-        numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("share", "radian", "zero", "fine")}
+        numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("share", "radian", "coarse", "fine")}
         for field, value in {"ahead": tuple(map(float, self.ahead)), **numbers}.items():
             object.__setattr__(self, field, value)
 
@@ -71,7 +71,7 @@ class Track(Processing):
     def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
         """See :meth:`Processing.act`."""
         features, due, arm = np.empty((len(batch.q), network.sizes[0])), held.left == 0, _arm(problem)
-        scales, seen = (self.radian, self.zero, self.fine), (batch.q, batch.qdot, batch.pose, batch.nominal)
+        scales, seen = (self.radian, self.coarse, self.fine), (batch.q, batch.qdot, batch.pose, batch.nominal)
         track_rows(problem.task.kind, problem.model.chain, scales, *arm, *seen, features)
         if due.any():
             held.values[due] = network.forward(features[due].astype(np.float32))
@@ -83,5 +83,5 @@ class Track(Processing):
 
 @functools.lru_cache
 def _arm(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where joints are seen from, half of their ranges, and their largest velocities. Shapes (n,)."""
+    """Where joints are seen from, their units, and their largest velocities. Shapes (n,)."""
     return *middle(problem.model), problem.largest_qdot

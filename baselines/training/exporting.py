@@ -81,7 +81,7 @@ def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, 
         network = runtime(*_actor(model.policy))
     except TypeError as e:
         raise InvalidInputError(f"model: {e}.") from None
-    processing = Track(task.ahead, task.share, task.radian, task.zero, task.fine)
+    processing = Track(task.ahead, task.share, task.radian, task.coarse, task.fine)
     sizes, needed = (network.sizes[0], network.sizes[-1]), (processing.size(problem), processing.outputs(problem))
     if sizes != needed:
         raise InvalidInputError(

@@ -99,7 +99,7 @@ class ReachEnv(TaskEnv):
     """
 
     task, steps, reward_threshold = (
-        Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, counted=50),
+        Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, coarse=0.3, counted=50),
         100,
         60.0,
     )
@@ -115,16 +115,16 @@ class TrackEnv(TaskEnv):
 
     ## Action space
     `Box(-1.0, 1.0, (7,), float32)`: joint velocities as shares of 0.6 of their limits, 2.175 rad/s in joints 1 to 4
-    and 2.61 rad/s in joints 5 to 7. The arm's limits of acceleration hold on top.
+    and 2.61 rad/s in joints 5 to 7. The arm has them at once; its accelerations are not limited.
 
     ## Observation space
     `Box(-5.0, 5.0, (38,), float32)`:
 
     | index | meaning | unit |
     |---|---|---|
-    | 0 – 6 | joint coordinates from home | half of a joint's range |
+    | 0 – 6 | joint coordinates from home | 1 rad |
     | 7 – 13 | joint velocities last applied | velocity limit |
-    | 14 – 19 | position and orientation error to the reference 1 step ahead, seen from joint 1 | 0.1 m, 0.33 rad |
+    | 14 – 19 | position and orientation error to the reference 1 step ahead, seen from joint 1 | 0.03 m, 0.1 rad |
     | 20 – 25 | hyperbolic tangent of the same | 0.01 m, 0.033 rad |
     | 26 – 37 | indices 14 to 25 for the reference 5 steps ahead | |
 

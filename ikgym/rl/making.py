@@ -29,8 +29,9 @@ class Task(Frozen):
         commands: Number of past commands shown.
         share: See :class:`ikgym.rl.ShareAction`.
         radian: Weight of 1 rad in [m], in observation and reward.
-        zero: Distance without reward in [m], also the coarse unit of errors in the observation.
-        fine: Fine unit of errors in the observation, in [m].
+        zero: Distance without reward in [m].
+        coarse: Unit of errors in the observation, in [m].
+        fine: Unit of the hyperbolic tangent of the same, in [m].
         counted: Steps at the end of an episode whose cost is scored; None for all.
     """
 
@@ -42,6 +43,7 @@ class Task(Frozen):
     share: float = 0.6
     radian: float = 0.3
     zero: float = 0.1
+    coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
 
@@ -64,7 +66,7 @@ class Task(Frozen):
         """The environment in the wrappers of a module."""
         env = kinds.ShareAction(env, self.share)
         env = kinds.DistanceReward(env, self.radian, self.zero)
-        env = kinds.TrackObservation(env, self.radian, self.zero, self.fine)
+        env = kinds.TrackObservation(env, self.radian, self.coarse, self.fine)
         return env if self.history == 1 else kinds.History(env, self.history)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,9 +29,8 @@ class TrackStage(Stage):
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}
         scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())
-        home, half = middle(scenario.model)
         self._fastest = scenario.largest_qdot
-        self._command = scenario.task.kind, scenario.model.chain, scales, home, half, self._fastest
+        self._command = scenario.task.kind, scenario.model.chain, scales, *middle(scenario.model), self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         self._own = 2 * (scenario.joints + len(env.unwrapped.preview) * int(twist_size(scenario.task.kind)))
         added = spaces.flatdim(spaces.Dict({key: space[key] for key in self._more}))
@@ -100,16 +98,16 @@ def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
 
 
 def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
-    """Where joints are seen from, and half of their range, in [rad] or [m]. Shapes (n,).
+    """Where joints are seen from, in [rad] or [m], and the unit of their coordinates. Shapes (n,).
 
-    Home, or the middle of the range where there is no home, and 0 without a range. Half of a range is π rad or 1 m
-    where there is none.
+    Home, or the middle of the range where there is no home, and 0 without a range. The unit is 1 rad; for a prismatic
+    joint half of its range, 1 m without a range.
     """
     limited = np.isfinite(arm.upper - arm.lower)
     lower, upper = (np.where(limited, limit, 0.0) for limit in (arm.lower, arm.upper))
-    half = np.where(limited, 0.5 * (upper - lower), np.where(arm.prismatic, 1.0, math.pi))
+    units = np.where(limited & np.array(arm.prismatic), 0.5 * (upper - lower), 1.0)
     home = np.clip(0.5 * (lower + upper), arm.lower, arm.upper) if arm.home is None else np.array(arm.home)
-    return home, half
+    return home, units
 
 
 def own_space(env: Any) -> spaces.Dict:

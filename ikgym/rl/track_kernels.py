@@ -15,7 +15,7 @@ MOST = 5.0
 
 
 @kernel
-def track_rows(kind, chain, scales, home, half, fastest, q, qdot, pose, nominal, out):
+def track_rows(kind, chain, scales, home, units, fastest, q, qdot, pose, nominal, out):
     """The features row by row, see :class:`ikgym.rl.TrackObservation`.
 
     Args:
@@ -23,7 +23,7 @@ def track_rows(kind, chain, scales, home, half, fastest, q, qdot, pose, nominal,
         chain: The arm's model, see :class:`ikgym.kernels.kinematics.Chain`.
         scales: Weight of 1 rad in [m], and the coarse and the fine unit of distances in [m].
         home: Posture in [rad] or [m] from which joints are seen. Shape (n,).
-        half: Half of the range of each joint in [rad] or [m]. Shape (n,).
+        units: Of joint coordinates in [rad] or [m]. Shape (n,).
         fastest: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
         q: Shape (N, n).
         qdot: Shape (N, n).
@@ -36,7 +36,7 @@ def track_rows(kind, chain, scales, home, half, fastest, q, qdot, pose, nominal,
     error, missing = np.empty(6), np.empty(w)
     for row in range(q.shape[0]):
         for j in range(n):
-            out[row, j] = min(max((q[row, j] - home[j]) / half[j], -MOST), MOST)
+            out[row, j] = min(max((q[row, j] - home[j]) / units[j], -MOST), MOST)
             out[row, n + j] = min(max(qdot[row, j] / fastest[j], -MOST), MOST)
         at = 2 * n
         for i in range(nominal.shape[1]):

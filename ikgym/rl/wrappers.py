@@ -74,7 +74,7 @@ class TrackObservation(ArmWrapper):
 
     | size | feature |
     |---|---|
-    | n | joint coordinates from home, in half of their ranges |
+    | n | joint coordinates from home in [rad], of prismatic joints in half of their ranges |
     | n | joint velocities last applied, as shares of the largest |
     | 2 w each | position and orientation error to the reference at each step ahead that is shown, in units of \
 `coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
@@ -84,7 +84,7 @@ class TrackObservation(ArmWrapper):
     Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
     joint 1, so that a turn of joint 1 changes none of them; from the base frame where joint 1 is prismatic, and for
     skew coordinates, which are no vector. Without a home joints are seen from the middle of their range, or from 0;
-    half of a range is π rad or 1 m where a joint has none.
+    half of a range is 1 m where a prismatic joint has none.
 
     Args:
         env: The environment, whose observation no other wrapper has changed.
@@ -96,7 +96,7 @@ class TrackObservation(ArmWrapper):
         InvalidInputError: A parameter is out of its range, or the observation was changed.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01) -> None:
+    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.03, fine: float = 0.01) -> None:
         stage = TrackStage(env, radian, coarse, fine)
         super().__init__(env, stage, radian=radian, coarse=coarse, fine=fine)
 

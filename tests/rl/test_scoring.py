@@ -42,7 +42,7 @@ def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
 def test_yardsticks_stand_in_their_order(name):
     for split in ("validation", "test"):
         own = yardsticks(split)[name]
-        assert own["best"] < own["dls"] < own["still"]
+        assert own["best"] <= own["dls"] < own["still"]
 
 
 @pytest.mark.parametrize("name", [TRACK, "ikgym/Reach-v0"])

@@ -99,7 +99,7 @@ def test_the_reference_is_shown_at_times_ahead(dt, steps):
 def test_what_an_arm_sees_of_a_task(name, task):
     """Before a step in which the arm stands still: the errors of that step, seen from joint 1."""
     scenario = ikgym.scenarios.get(name).replace(task=ikgym.tasks.get(task))
-    env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, fine=5.0, radian=0.5, lost_distance=None)
+    env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, coarse=50.0, fine=5.0, radian=0.5, lost_distance=None)
     arm = scenario.model
     start = np.where(arm.prismatic, 0.2, 0.3) if arm.home is None else np.array(arm.home) + 0.1
     features, _ = env.reset(seed=3, options={"q": start})
@@ -119,13 +119,14 @@ def test_what_an_arm_sees_of_a_task(name, task):
 
 
 def test_joints_are_seen_from_home_or_the_middle_of_their_range():
-    panda, unlimited = ikgym.arms.get("panda"), ikgym.arms.get("varga7")
-    home, half = middle(panda)
+    panda, fetch, unlimited = map(ikgym.arms.get, ("panda", "fetch", "varga7"))
+    home, units = middle(panda)
     assert np.array_equal(home, panda.home)
-    assert np.array_equal(half, 0.5 * (panda.upper - panda.lower))
+    assert units.tolist() == [1.0] * 7
     assert np.array_equal(middle(panda.replace(home=None))[0], 0.5 * (panda.upper + panda.lower))
-    home, half = middle(unlimited)
+    assert middle(fetch)[1].tolist() == [0.5 * (fetch.upper - fetch.lower)[0], *[1.0] * 7]
+    home, units = middle(unlimited)
     assert not home.any()
-    assert np.array_equal(half, np.where(unlimited.prismatic, 1.0, np.pi))
+    assert units.tolist() == [1.0] * 7
     one_sided = unlimited.replace(lower=[0.5, *[-np.inf] * 6])
     assert middle(one_sided)[0].tolist() == [0.5, *[0.0] * 6]

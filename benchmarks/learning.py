@@ -1,0 +1,162 @@
+"""Scores of Stable-Baselines3 in the environments by id: ``python -m benchmarks.learning --algorithms ppo``.
+
+Trains each algorithm in each environment with each seed, a process a core, and plays the last model on episodes of the
+split `test`. ``docs/results/learning_runs.csv`` keeps the curves; a run that stands there with the same settings is not
+repeated, so the command may be killed and continued. ``docs/results/learning.csv`` has a line for each algorithm and
+environment, ``docs/images/learning.png`` the curves.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import csv
+import dataclasses
+import hashlib
+import itertools
+import json
+import multiprocessing
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from matplotlib.figure import Figure
+
+from baselines.evaluation.plots import style
+from baselines.evaluation.records import from_csv, to_csv
+from baselines.files import write
+from baselines.training.rewards import ALGORITHMS, Training
+from ikgym import rl
+
+DOCS = Path(__file__).parents[1] / "docs"
+CURVES, TABLE, PICTURE = DOCS / "results/learning_runs.csv", DOCS / "results/learning.csv", DOCS / "images/learning.png"
+#: What one training is known by, and what a line of the table is about.
+RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("environment", "algorithm", "settings")
+#: Episodes of the split `test`.
+EPISODES = 256
+#: CPU time of a run with the defaults of the library, which know no number of steps, in [min].
+MINUTES = 10.0
+Line = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """Trains, and writes curves and scores."""
+
+    algorithms: tuple[str, ...] = tuple(ALGORITHMS)
+    """Of Stable-Baselines3."""
+    environments: tuple[str, ...] = tuple(rl.IDS)
+    """Their ids."""
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """Of the trainings."""
+    defaults: bool = False
+    """The defaults of Stable-Baselines3 in place of the published settings."""
+    workers: int = 2
+    """Processes that train at the same time."""
+    runs: Path = Path("runs") / "learning"
+    """Folder of the models."""
+
+    def trainings(self) -> list[Training]:
+        """All of them, the first seeds first."""
+        minutes = MINUTES if self.defaults else None
+        return [
+            Training(algorithm, env, seed, minutes=minutes, defaults=self.defaults)
+            for seed, env, algorithm in itertools.product(self.seeds, self.environments, self.algorithms)
+        ]
+
+
+def about(training: Training) -> Line:
+    """What a training is known by."""
+    digest = hashlib.sha256(json.dumps(training.read(), sort_keys=True).encode()).hexdigest()[:8]
+    kind = "defaults" if training.defaults else "published"
+    return dict(zip(RUN, (training.env, training.algorithm, kind, digest, str(training.seed)), strict=True))
+
+
+def curve(training: Training, folder: Path) -> list[Line]:
+    """Trains, and gives the lines of the curve; the last one has the test."""
+    training.run(folder)
+    with (folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
+        lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in csv.DictReader(stream)]
+    model = ALGORITHMS[training.algorithm].load(folder / "model.zip", device="cpu")
+    cost = rl.costs(model, training.env, split="test", episodes=EPISODES)
+    lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
+    return lines
+
+
+def table(lines: Sequence[Line]) -> list[Line]:
+    """Interquartile means over the seeds, a line for each algorithm and environment."""
+    out = []
+    for group, found in _groups(lines).items():
+        last = [line for line in found if line["test_log_cost"]]
+        cost = np.expm1([[float(line["test_log_cost"])] for line in last])
+        score = rl.score({group[0]: cost})[group[0]]
+        medians = {name: float(np.median([float(one[name]) for one in last])) for name in ("steps", "core_seconds")}
+        effort = {"steps": int(medians["steps"]), "core_minutes": round(medians["core_seconds"] / 60.0, 1)}
+        scores = {"score": score.mean, "low": score.low, "high": score.high, "best": score.best}
+        counted = {"seeds": len(last), "episodes": EPISODES, **effort}
+        rounded = {name: round(value, 3) for name, value in scores.items()}
+        out.append({**dict(zip(GROUP, group, strict=True)), **counted, **rounded})
+    return out
+
+
+def picture(lines: Sequence[Line]) -> Figure:
+    """Validation scores over core-minutes, a panel for each environment, a line for each seed."""
+    drawn = style.figure(6.0)
+    panels = dict(zip(rl.IDS, drawn.subplots(2, 3, sharey=True).flat, strict=True))
+    handles: Line = {}
+    for (env, algorithm, kind), found in sorted(_groups(lines).items()):
+        look = {**style.looks(list(ALGORITHMS).index(algorithm)), "lw": 0.8}
+        label = f"{algorithm}, defaults" if kind == "defaults" else algorithm
+        for _, seed in itertools.groupby(found, lambda line: line["seed"]):
+            rows = list(seed)
+            minutes = [float(row["core_seconds"]) / 60.0 for row in rows]
+            shade = {"alpha": 0.4, "ls": ":"} if kind == "defaults" else {}
+            (handles[label],) = panels[env].plot(minutes, [float(row["score"]) for row in rows], **look | shade)
+    for env, axes in panels.items():
+        style.dress(axes, title=env, xlabel="core-minutes", ylabel="score", ticks=4)
+        axes.set_ylim(-0.2, 1.05)
+    style.legend(drawn, "Validation score, a line for each training seed", list(handles.values()), list(handles))
+    return drawn
+
+
+def main() -> None:
+    """Trains what is missing, and writes the files."""
+    command = tyro.cli(Command, description=__doc__)
+    kept = {tuple(line[name] for name in RUN) for line in _measured()}
+    missing = [one for one in command.trainings() if tuple(about(one).values()) not in kept]
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(command.workers, context) as pool:
+        jobs = {}
+        for one in missing:
+            name = f"{one.env.split('/')[1]}-{one.algorithm}{'-defaults' * one.defaults}"
+            jobs[pool.submit(curve, one, command.runs / name / f"seed-{one.seed}")] = about(one)
+        for done, job in enumerate(concurrent.futures.as_completed(jobs), 1):
+            new = job.result()
+            lines = [line for line in _measured() if not _same(line, jobs[job])] + new
+            lines.sort(key=lambda line: (*(line[name] for name in RUN if name != "digest"), float(line["steps"])))
+            write(CURVES, to_csv(lines).encode())
+            print(f"{done} of {len(jobs)}: {' '.join(jobs[job].values())}: {new[-1]['score']}", flush=True)
+    write(TABLE, to_csv(table(_measured())).encode())
+    write(PICTURE, style.small_png(picture(_measured())))
+
+
+def _measured() -> list[Line]:
+    """The lines of the curves; another process may add some."""
+    return from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []  # type: ignore[return-value]
+
+
+def _groups(lines: Sequence[Line]) -> dict[tuple[str, ...], list[Line]]:
+    out: dict[tuple[str, ...], list[Line]] = {}
+    for line in lines:
+        out.setdefault(tuple(line[name] for name in GROUP), []).append(line)
+    return out
+
+
+def _same(line: Line, run: Line) -> bool:
+    """Whether a line is of this run, also with former settings."""
+    return all(line[name] == run[name] for name in RUN if name != "digest")
+
+
+if __name__ == "__main__":
+    main()
