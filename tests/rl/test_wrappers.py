@@ -62,6 +62,14 @@ def test_native_is_sync_of_singles_bit_for_bit(name, distance, share, mode):
     assert over > 0
 
 
+@pytest.mark.parametrize("wrapper", [rl.TrackObservation, rl.ShareAction, rl.DistanceReward])
+def test_each_wrapper_stands_on_its_own(wrapper):
+    env = wrapper(gym.make("RedundantIK-v0", scenario=short(), lost_distance=0.05))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # tables in an observation
+        check_env(env, skip_render_check=True)
+
+
 def test_history_stands_newest_first():
     env = rl.make(short(), history=3)
     first = env.reset(seed=0)[0].reshape(3, -1)
@@ -91,11 +99,11 @@ def test_the_reference_is_shown_at_times_ahead(dt, steps):
 def test_what_an_arm_sees_of_a_task(name, task):
     """Before a step in which the arm stands still: the errors of that step, seen from joint 1."""
     scenario = ikgym.scenarios.get(name).replace(task=ikgym.tasks.get(task))
-    env = rl.make(scenario, ahead=(scenario.dt,), coarse=50.0, radian=0.5, lost_distance=None)
+    env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, coarse=50.0, fine=5.0, radian=0.5, lost_distance=None)
     arm = scenario.model
     start = np.where(arm.prismatic, 0.2, 0.3) if arm.home is None else np.array(arm.home) + 0.1
     features, _ = env.reset(seed=3, options={"q": start})
-    *_, info = env.step(np.zeros(arm.joints, dtype=np.float32))
+    _, reward, *_, info = env.step(np.zeros(arm.joints, dtype=np.float32))
     units = 50.0 * features[2 * arm.joints :].reshape(2, -1)[0]
     coarse = np.roll(units, 3) if task == "skew" else units  # it begins with the orientation
     assert np.linalg.norm(coarse[:3]) == pytest.approx(info["position_error"], rel=1e-5)
@@ -105,8 +113,9 @@ def test_what_an_arm_sees_of_a_task(name, task):
     if task != "skew" and not arm.prismatic[0]:
         missing = ikgym.kernels.rotations.rodrigues(arm.chain.axes[0], -start[0]) @ missing
     np.testing.assert_allclose(coarse[:3], missing, rtol=1e-5, atol=1e-6)
-    fine = np.tanh(units / 0.01)
-    np.testing.assert_allclose(features[2 * arm.joints :].reshape(2, -1)[1], fine, atol=1e-3)
+    np.testing.assert_allclose(features[2 * arm.joints :].reshape(2, -1)[1], np.tanh(units / 5.0), atol=1e-5)
+    square = info["position_error"] ** 2 + (0.5 * info.get("orientation_error", 0.0)) ** 2
+    assert reward == pytest.approx(1.0 - np.log1p(1e6 * square) / np.log1p(1e6 * 50.0**2), rel=1e-12)
 
 
 def test_joints_are_seen_from_home_or_the_middle_of_their_range():
