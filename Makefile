@@ -20,8 +20,8 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@touch $@
 
-demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all) on the default scenario: results/demo/report.html
-	$(BIN)/ikgym evaluate --scenarios varga7-fast --policies $(DEMO) --out results/demo --overwrite
+demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all, also on a Panda) on the default scenario: results/demo/report.html
+	$(BIN)/ikgym evaluate --scenarios varga7-fast $(if $(filter all,$(DEMO)),panda-random) --policies $(DEMO) --out results/demo --overwrite
 
 test: $(STAMP) ## Run the tests that are not marked slow
 	$(PYTEST) -m "not slow"

@@ -58,6 +58,7 @@ _import_paths: dict[str, str] = {
     "fixed_point": f"{_SOLVERS}.fixed_point.fixed_point:FixedPoint",
     "abstract_rotation": f"{_SOLVERS}.fixed_point.abstract_rotation:AbstractRotation",
     "agent_alone": "baselines.agents.policy:AgentAlone",
+    "agent_track": "baselines.agents.policy:AgentTrack",
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
     "pink": f"{_SOLVERS}.rivals.task_program:Pink",
     "mink": f"{_SOLVERS}.rivals.task_program:Mink",

@@ -56,7 +56,7 @@ class Command:
     """The defaults of Stable-Baselines3 in place of the published settings."""
     workers: int = 2
     """Processes that train at the same time."""
-    runs: Path = Path("runs") / "learning"
+    runs: Path = Path("runs")
     """Folder of the models."""
 
     def trainings(self) -> list[Training]:

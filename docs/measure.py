@@ -15,7 +15,7 @@ import itertools
 import shutil
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,7 +26,7 @@ import tyro
 import baselines
 import ikgym
 from baselines import registry
-from baselines.agents.files import save_agent
+from baselines.agents.files import AgentFile, save_agent
 from baselines.episodes import rollouts
 from baselines.evaluate import evaluate
 from baselines.evaluation.plots.comparison import front
@@ -34,6 +34,7 @@ from baselines.evaluation.records import from_csv, records, to_csv
 from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write
 from baselines.oracle import best_known
+from baselines.training.config import Rewards
 
 RESULTS = Path(__file__).parent / "results"
 #: What was measured lies here until the end, and agents are found here.
@@ -67,7 +68,8 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, plants."""
+    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, agents_panda,
+    plants."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -133,16 +135,29 @@ def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> l
 
 
 def untrained() -> None:
-    """Writes the agents of apg as they are before the first segment of their training."""
+    """Writes agents as they are before their training: of apg, and of PPO, SAC and TD3 in `ikgym/Track-v0`."""
+    from baselines.training import rewards
+    from baselines.training.config import PPO, SAC, TD3
+    from baselines.training.exporting import exported
     from baselines.training.methods import configure
     from baselines.training.trainer import Trainer
 
-    config = configure("standard")
-    for seed in SEEDS:
-        file = RUNS / UNTRAINED / f"seed-{seed}" / "agent.safetensors"
+    apg = configure("standard")
+    makers: dict[str, Callable[[int], AgentFile]] = {
+        UNTRAINED: lambda seed: Trainer(apg, apg.make_scenario(), seed).agent()
+    }
+    for config in (kind(env="ikgym/Track-v0") for kind in (PPO, SAC, TD3)):
+
+        def made(seed: int, config: Rewards = config) -> AgentFile:
+            model: Any = rewards.make(config, rewards.read(config), seed)
+            return exported(model, model.get_env())
+
+        makers[f"{UNTRAINED}-{config.method}"] = made
+    for (name, make), seed in itertools.product(makers.items(), SEEDS):
+        file = RUNS / name / f"seed-{seed}" / "agent.safetensors"
         if not file.exists():
             file.parent.mkdir(parents=True, exist_ok=True)
-            save_agent(file, Trainer(config, config.make_scenario(), seed).agent())
+            save_agent(file, make(seed))
 
 
 def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]:

@@ -36,6 +36,7 @@ def test_it_holds_every_module_and_all_data(content):
         "best_known.json",
         "ranges.toml",
         "agents/agent_alone.safetensors",
+        "agents/agent_track.safetensors",
     ):
         assert f"baselines/data/{file}" in content
     assert "baselines/training/presets.toml" in content

@@ -191,8 +191,26 @@ class AgentAlone(LearnedPolicy):
     name: ClassVar[str] = "agent_alone"
 
     def __post_init__(self) -> None:
-        file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash, (Bilinear,))
+        file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash, (Bilinear, Track))
         self._take(dataclasses.replace(file, source=self.name))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AgentTrack(AgentAlone):
+    """Learned agent that comes with the package, trained in `ikgym/Track-v0` by SAC.
+
+    Args:
+        problem: The part of the scenario that the policy knows.
+        hash: The first twelve digits of its hash, which distinguishes its results from those of a successor.
+        interval: See :class:`LearnedPolicy`.
+
+    Raises:
+        InvalidInputError: The file has another hash, or the scenario does not fit the agent.
+    """
+
+    hash: str = "HASH"
+
+    name: ClassVar[str] = "agent_track"
 
 
 def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[type[Processing]]) -> AgentFile:

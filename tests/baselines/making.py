@@ -12,7 +12,9 @@ from ikgym.trajectories.paths import Circle
 
 
 def usual(name):
-    """A scenario that suits a policy: solvers of other projects know no skew coordinates."""
+    """A scenario that suits a policy: solvers of other projects know no skew coordinates, an agent only its arm."""
+    if name == "agent_track":
+        return "panda-circle"
     return "zhang6-lspb" if get(name).rival else "varga7-fast"
 
 

@@ -168,6 +168,17 @@ def test_the_agent_of_the_package():
         baselines.make("agent_alone", RANDOM, hash="0" * 12)
     with pytest.raises(InvalidInputError, match="was trained for the arm varga7"):
         baselines.make("agent_alone", PANDA)
-    assert sorted(file.stem for file in FOLDER.glob("*.safetensors")) == ["agent_alone"]
+    assert sorted(file.stem for file in FOLDER.glob("*.safetensors")) == ["agent_alone", "agent_track"]
     about = policy.file.about
     assert (about["training"]["method"], about["scenario"]["name"]) == ("apg", "varga7-random")
+
+
+def test_the_agent_of_an_environment_by_id_follows_another_panda():
+    """It was trained at 100 Hz without limits of acceleration, and plays at 500 Hz with them."""
+    policy = baselines.make("agent_track", "panda-random")
+    assert policy.file.about["training"]["env"] == "ikgym/Track-v0"
+    assert policy.preview == (5, 25)
+    [row] = evaluate("panda-random", "agent_track", episodes=1)
+    assert 1e-4 < row.position_error_rms < 3e-3
+    with pytest.raises(InvalidInputError, match="was trained for the arm panda-velocity"):
+        baselines.make("agent_track", "varga7-pose-random")

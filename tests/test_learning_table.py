@@ -1,0 +1,48 @@
+"""The scores of Stable-Baselines3 on the page of agents are those of the settings that are published."""
+
+import pytest
+
+from baselines.evaluation.records import from_csv, to_csv
+from baselines.training.rewards import Training, read
+from benchmarks import learning
+from ikgym import rl
+
+CURVES = from_csv(learning.CURVES.read_text(encoding="utf-8"))
+PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
+
+
+def test_curves_are_of_the_published_settings(tmp_path):
+    runs = {tuple(line[name] for name in learning.RUN) for line in PUBLISHED}
+    for env, algorithm, _, _, seed in runs:
+        training = Training(learning.CONFIGS[algorithm](env=env), int(seed), tmp_path)
+        assert tuple(learning.about(training).values()) in runs
+
+
+def test_the_table_is_that_of_the_curves():
+    assert to_csv(learning.table(CURVES)) == learning.TABLE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("env", "algorithm", "least"), [
+    ("ikgym/Track-v0", "ppo", 0.5), ("ikgym/Track-v0", "sac", 0.5), ("ikgym/Track-v0", "td3", 0.5),
+    ("ikgym/Reach-v0", "ppo", 0.5), ("ikgym/Reach-v0", "sac", 0.5), ("ikgym/Reach-v0", "td3", 0.3),
+])  # fmt: skip
+def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
+    [line] = [one for one in learning.table(PUBLISHED) if (one["environment"], one["algorithm"]) == (env, algorithm)]
+    assert line["score"] >= least
+    assert line["seeds"] == 5
+    assert line["core_minutes"] <= 10.0
+
+
+def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
+    small = tmp_path / "curves.csv"
+    monkeypatch.setattr(learning, "EPISODES", 2)
+    training = Training(learning.CONFIGS["ppo"](env="ikgym/Track-v0", total_timesteps=2048, episodes=2), 0, tmp_path)
+    lines = learning.curve(training)
+    small.write_text(to_csv(lines), encoding="utf-8")
+    assert from_csv(small.read_text(encoding="utf-8"))[-1]["test_log_cost"]
+    assert [bool(line["test_log_cost"]) for line in lines] == [*[False] * (len(lines) - 1), True]
+    [row] = learning.table(lines)
+    assert row["seeds"] == 1
+    assert row["best"] == pytest.approx(rl.score({"ikgym/Track-v0": [[1.0]]})["ikgym/Track-v0"].best, abs=1e-3)
+    assert read(training.config)["n_envs"] == 64
+    assert all(axes.lines for axes in learning.picture(lines).axes[1:2])
