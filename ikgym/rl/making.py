@@ -105,6 +105,7 @@ class Task(Wrapping):
         zero: Distance without reward in [m], also the coarse unit of errors in the observation.
         fine: Fine unit of errors in the observation, in [m].
         counted: Steps at the end of an episode whose cost is scored; None for all.
+        context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
     """
 
     scenario: str = "learning-track"
@@ -115,13 +116,14 @@ class Task(Wrapping):
     zero: float = 0.1
     fine: float = 0.01
     counted: int | None = None
+    context: bool = False
 
     reentry = False
 
     def _wrap(self, env: Any, kinds: Any) -> Any:
         env = kinds.ShareAction(env, self.share)
         env = kinds.DistanceReward(env, self.radian, self.zero)
-        return kinds.TrackObservation(env, self.radian, self.zero, self.fine)
+        return kinds.TrackObservation(env, self.radian, self.zero, self.fine, self.context)
 
 
 def make(scenario: str | Scenario, *, render_mode: str | None = None, **changes: Any) -> gym.Env[Any, Any]:
