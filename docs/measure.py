@@ -34,6 +34,7 @@ from baselines.evaluation.records import from_csv, records, to_csv
 from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write
 from baselines.oracle import best_known
+from docs import contexts
 
 RESULTS = Path(__file__).parent / "results"
 #: What was measured lies here until the end, and agents are found here.
@@ -67,7 +68,8 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, plants."""
+    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, plants and
+    contexts."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -222,7 +224,7 @@ def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        own = {"agents_interval": intervals, "periods": periods, "plants": plants}
+        own = {"agents_interval": intervals, "contexts": contexts.measured, "periods": periods, "plants": plants}
         make = own.get(name, functools.partial(measured, name))
         new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
