@@ -100,8 +100,8 @@ def measured(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
         elif name in old:
             out.append(old[name])
     best = min(float(line["interpolation"]) for line in out if line["policy"] in ADAPTIVE)
-    gap = {line["policy"]: 100.0 * (1.0 - np.log(float(line["interpolation"])) / np.log(best)) for line in out}
-    return [{**line, "gap_percent": float(gap[line["policy"]])} for line in out]
+    gap = {line["policy"]: 1.0 - np.log(float(line["interpolation"])) / np.log(best) for line in out}
+    return [{**line, "gap_closed": float(gap[line["policy"]])} for line in out]
 
 
 def _line(policy: str, played: Played, told: Played) -> Line:
@@ -111,7 +111,7 @@ def _line(policy: str, played: Played, told: Played) -> Line:
         ratios = costs / told[split][0]
         line[split] = geometric_mean(ratios)
         line[f"{split}_low"], line[f"{split}_high"] = geometric_interval(ratios)
-    return line | {"lost_percent": 100.0 * float(np.mean([away for _, away in played.values()])), "gap_percent": None}
+    return line | {"lost_percent": 100.0 * float(np.mean([away for _, away in played.values()])), "gap_closed": None}
 
 
 def _solver(name: str) -> Played:

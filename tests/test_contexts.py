@@ -53,11 +53,11 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     lines = {line["policy"]: line for line in contexts.measured(only_new=True)}
     assert lines.keys() == {*contexts.POLICIES, "ppo_shown", "ppo_history"}
     told, shown = lines["told"], lines["ppo_shown"]
-    assert (told["train"], told["interpolation"], told["extrapolation"], told["gap_percent"]) == (1.0, 1.0, 1.0, 100.0)
+    assert (told["train"], told["interpolation"], told["extrapolation"], told["gap_closed"]) == (1.0, 1.0, 1.0, 1.0)
     assert lines["filter_bank"]["interpolation"] == "4"
     best = min(float(lines[name]["interpolation"]) for name in contexts.ADAPTIVE)
-    assert shown["gap_percent"] == pytest.approx(100 * (1 - np.log(shown["interpolation"]) / np.log(best)))
-    assert shown["gap_percent"] < 0.0
+    assert shown["gap_closed"] == pytest.approx(1 - np.log(shown["interpolation"]) / np.log(best))
+    assert shown["gap_closed"] < 0.0
     assert shown["minutes"] == json.loads(model.with_name("run.json").read_text())["minutes"] == 0.001
     assert [line["interpolation"] for line in contexts.measured(only_times=True)] == ["7", "4"]
 

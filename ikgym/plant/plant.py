@@ -211,7 +211,7 @@ class Plant(Frozen):
         """Whether episodes draw the arm or its drives, which `arm_seed` can keep."""
         return self._on("zero", "link", "axis") or len(self.arms) > 1 or bool(self.context)
 
-    @property
+    @functools.cached_property
     def context(self) -> tuple[str, ...]:
         """The fields that are ranges, from which episodes draw."""
         ends = {name: np.broadcast_to(getattr(self, name), 2) for name in Numbers._fields}
