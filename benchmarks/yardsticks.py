@@ -71,7 +71,7 @@ def tuned(scenario: Scenario, steps: int | None) -> str:
 def measured(name: str, split: str, dls: str) -> dict[str, float]:
     """Mean logarithms of 1 + cost of an environment."""
     task = rl.IDS[name].task
-    scenario, seeds = scenarios.get(task.scenario), scenarios.seeds(split, EPISODES)
+    scenario, seeds = scenarios.find(task.scenario), scenarios.seeds(split, EPISODES)
     least = counted(scenario, dls, seeds, task.counted)
     means = {"still": float(np.log1p(rl.costs(Still(), name, split=split, episodes=EPISODES)).mean())}
     means["dls"] = float(least.mean())
@@ -85,7 +85,7 @@ def main() -> None:
     """Measures all of them and writes the file."""
     out: dict[str, Any] = {"dls_settings": {}, "validation": {}, "test": {}}
     for name, kind in rl.IDS.items():
-        dls = tuned(scenarios.get(kind.task.scenario), kind.task.counted)
+        dls = tuned(scenarios.find(kind.task.scenario), kind.task.counted)
         out["dls_settings"][name] = dls
         for split in ("validation", "test"):
             out[split][name] = measured(name, split, dls)

@@ -53,7 +53,7 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
     "dls": ("dls", {"gain": 0.15}),
 }
 #: Learners by their names: the class, the network, and what is observed.
-USUAL = Task(commands=4, share=0.5)
+USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
 LEARNERS = {
     "ppo_shown": ("PPO", "MlpPolicy", USUAL.replace(context=True)),
     "ppo_history": ("PPO", "MlpPolicy", USUAL.replace(history=4)),
@@ -139,7 +139,7 @@ def play(model: Any, task: Task, scenario: str, seeds: Sequence[int]) -> tuple[F
     Returns:
         The benchmark's costs, and whether arms were lost. Shapes (e,).
     """
-    envs = task.replace(lost_distance=None).arms(scenario, len(seeds), autoreset_mode="Disabled")
+    envs = task.replace(scenario=scenario, lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
     observation, _ = envs.reset(seed=list(seeds))
     state, begun, costs, worst = None, np.ones(len(seeds), dtype=np.bool_), np.zeros(len(seeds)), np.zeros((2, 1))
     for _ in range(envs.scenario.steps):
@@ -170,7 +170,7 @@ def train(name: str, seed: int, minutes: float) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     kind, network, task = LEARNERS[name]
-    envs = LearningVecEnv(8, SPLITS["train"][0], task)
+    envs = LearningVecEnv(8, task)
     model = _kind(kind)(network, envs, seed=seed, device="cpu", **SETTINGS)
     end = time.process_time() + 60.0 * minutes
     model.learn(FOREVER, callback=Clock())

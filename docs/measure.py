@@ -136,15 +136,15 @@ def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> l
 
 def untrained() -> None:
     """Writes the agents of apg as they are before the first segment of their training."""
-    from baselines.training.config import APG
-    from baselines.training.methods import configure, new_trainer
+    from baselines.training.methods import configure
+    from baselines.training.trainer import Trainer
 
-    config = configure(APG, "standard")
+    config = configure("standard")
     for seed in SEEDS:
         file = RUNS / UNTRAINED / f"seed-{seed}" / "agent.safetensors"
         if not file.exists():
             file.parent.mkdir(parents=True, exist_ok=True)
-            save_agent(file, new_trainer(config, config.make_scenario(), seed).agent())
+            save_agent(file, Trainer(config, config.make_scenario(), seed).agent())
 
 
 def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]:

@@ -16,10 +16,9 @@ from ikgym.kernels.outcome import OBSERVED as OBSERVED
 from ikgym.kernels.outcome import Observation, observation
 from ikgym.options import checked_distance, checked_options
 from ikgym.scenarios import Preview, Scenario
-from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray, flag
+from ikgym.validation import FloatArray
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -113,9 +112,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, also given by `spec.max_episode_steps`. Terminated
-    where the position error exceeds `lost_distance`, if there is one. With `reentry`, the next reset without other
-    options enters another episode at the step at which the last one was lost, on its joint path (at its beginning where
-    the reference is a path of the tool alone), so that a policy that loses its track early also sees the later parts.
+    where the position error exceeds `lost_distance`, if there is one.
 
     Args:
         scenario: A scenario, or its name: a registered one, a file ending in `.toml`, or
@@ -124,7 +121,6 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which the episode ends; None for never.
-        reentry: Whether the next episode is entered where the last one was lost.
 
     Raises:
         UnknownNameError: There is no such scenario.
@@ -141,7 +137,6 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         render_mode: str | None = None,
         commands: int = 0,
         lost_distance: float | None = None,
-        reentry: bool = True,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise InvalidInputError(
@@ -157,8 +152,6 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._step, self._ended = -1, True  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
         self.lost_distance = checked_distance(lost_distance)
-        self._resumed: int | None = None
-        self._entered = flag("reentry", reentry) and has_joint_path(self.scenario)
         self._has_orientation = self.scenario.task.has_orientation
         self._pictures: Pictures | None = None
         if render_mode is not None:
@@ -208,11 +201,10 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         options = checked_options(options, OPTIONS)
         starts = self._simulator.checked_starts(options.get("q"))
         arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
-        resumed = self._resumed if seed is None and not {"q", "step"} & options.keys() else None
-        steps = self._simulator.checked_steps(options.get("step", resumed))
+        steps = self._simulator.checked_steps(options.get("step"))
         super().reset(seed=seed)
         self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds, steps=steps)
-        self._step, self._ended, self._resumed = 0 if steps is None else int(steps[0]), False, None
+        self._step, self._ended = 0 if steps is None else int(steps[0]), False
         out = self._simulator.observe()
         if self._pictures is not None:
             self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
@@ -247,8 +239,6 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         if self._pictures is not None:
             self._pictures.add(position, orientation)
         lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps
-        if lost and not over and self._entered:
-            self._resumed = self._step
         self._ended = lost or over
         return seen, -(tracking + velocity), lost, over, info
 

@@ -16,7 +16,6 @@ from ikgym import rl
 from ikgym.env import OPTIONS, REPORTED
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.options import checked_options
-from ikgym.rl.making import Wrapping
 from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -224,8 +223,7 @@ class LearningVecEnv(RedundantIKVecEnv):
 
     Args:
         num_envs: N.
-        scenario: A scenario or its name, see `ikgym.scenarios.find`.
-        learning: The wrappers and their parameters.
+        task: The scenario and the parameters of the wrappers.
         render_mode: None or `"rgb_array"`.
 
     Raises:
@@ -233,12 +231,9 @@ class LearningVecEnv(RedundantIKVecEnv):
         InvalidInputError: A value is refused.
     """
 
-    def __init__(
-        self, num_envs: int, scenario: str | Scenario, learning: Wrapping, render_mode: str | None = None
-    ) -> None:
-        self.learning = learning
-        mode = AutoresetMode.SAME_STEP
-        self._take(learning.arms(scenario, num_envs, autoreset_mode=mode, render_mode=render_mode))
+    def __init__(self, num_envs: int, task: rl.Task, render_mode: str | None = None) -> None:
+        self.task = task
+        self._take(task.arms(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode))
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """One picture a row, for `VecVideoRecorder` and `render()`."""
@@ -260,16 +255,15 @@ def make_vec(
             in a `DummyVecEnv` are the same bit for bit.
         num_envs: N.
         render_mode: None or `"rgb_array"`.
-        changes: Fields of :class:`ikgym.rl.Learning`, for an id of :class:`ikgym.rl.Task`, with other values.
+        changes: Fields of :class:`ikgym.rl.Task` with other values.
 
     Raises:
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    if isinstance(scenario, str) and scenario in rl.IDS:
-        task = rl.IDS[scenario].task.replace(**changes)
-        return LearningVecEnv(num_envs, task.scenario, task, render_mode)
-    return LearningVecEnv(num_envs, scenario, rl.Learning().replace(**changes), render_mode)
+    by_id = isinstance(scenario, str) and scenario in rl.IDS
+    task = rl.IDS[str(scenario)].task if by_id else rl.Task(scenario)
+    return LearningVecEnv(num_envs, task.replace(**changes), render_mode)
 
 
 def _plain(value: Any) -> Any:

@@ -21,10 +21,9 @@ from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
 from ikgym.rows import ArmRow, Hinting, Infos, contexts, infos_of, last_observations
 from ikgym.scenarios import Preview, Scenario
-from ikgym.scenarios.entering import has_joint_path
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import BoolArray, FloatArray, flag, whole_number
+from ikgym.validation import BoolArray, FloatArray, whole_number
 
 
 class RedundantIKVectorEnv(
@@ -57,7 +56,6 @@ class RedundantIKVectorEnv(
         max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which an episode ends; None for never.
-        reentry: Whether the next episode of a row is entered where its last one was lost.
 
     Raises:
         UnknownNameError: There is no such scenario or autoreset mode.
@@ -75,7 +73,6 @@ class RedundantIKVectorEnv(
         max_episode_steps: int | None = None,
         commands: int = 0,
         lost_distance: float | None = None,
-        reentry: bool = True,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise InvalidInputError(
@@ -99,9 +96,6 @@ class RedundantIKVectorEnv(
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.lost_distance = checked_distance(lost_distance)
-        self._entered = flag("reentry", reentry) and has_joint_path(self.scenario)
-        # Steps at which rows that have lost their track enter their next episode; 0 elsewhere.
-        self._resumed = np.zeros(self.num_envs, dtype=np.int64)
         self._generators: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds: list[int | None] = [None] * self.num_envs
         self.render_mode = render_mode
@@ -173,8 +167,6 @@ class RedundantIKVectorEnv(
         starts = self._simulator.checked_starts(options.get("q"))
         arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
         steps = self._simulator.checked_steps(options.get("step"))
-        if not {"q", "step"} & options.keys():
-            steps = np.where([seed is None for seed in seeds], self._resumed, 0)
         for row, one in enumerate(seeds):
             if one is not None and mask[row]:
                 self._generators[row], self._seeds[row] = seeding.np_random(one)
@@ -206,8 +198,6 @@ class RedundantIKVectorEnv(
         over = stepping & (made == self.scenario.steps)
         lost = stepping & (out.position_error > (np.inf if self.lost_distance is None else self.lost_distance))
         ended = over | lost
-        if self._entered:
-            self._resumed[stepping] = np.where(lost & ~over, made, 0)[stepping]
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
         infos: Infos = {}
         if same_step:
@@ -216,7 +206,7 @@ class RedundantIKVectorEnv(
         infos.update(infos_of(out, stepping & ~ended if same_step else stepping, made, self.scenario))
         beginning = ended if same_step else waiting
         if beginning.any():
-            self._begin(beginning, steps=self._resumed.copy())
+            self._begin(beginning)
             self._simulator.observe(beginning, out)
             infos.update(contexts(self.context, beginning))
         self._record(out, begun=beginning, rows=self._begun)
@@ -287,7 +277,6 @@ class RedundantIKVectorEnv(
     ) -> None:
         generators = {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}
         self._simulator.reset(mask, generators, starts, arm_seeds, steps=steps)
-        self._resumed[mask] = 0
         self._begun |= mask
         self._ended = self._ended & ~mask
 

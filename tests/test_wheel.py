@@ -133,12 +133,11 @@ def test_agents_are_evaluated_from_the_wheel(installed):
 @pytest.mark.slow
 def test_an_agent_is_trained_from_the_wheel(installed):
     run, _, folder = installed
-    tiny = "--scenario panda-random --steps 20 --total-timesteps 80 --segments 2 --n-envs 4 --set n_steps=10"
-    few = "--validation-episodes 1 --no-progress --out runs"
-    run("ikgym", "train", "ppo", *tiny.split(), *few.split())
+    tiny = "--env ikgym/Track-v0 --total-timesteps 512 --validations 1 --episodes 2 --out runs"
+    run("ikgym", "train", "ppo", *tiny.split())
     agent = folder / "runs" / "seed-0" / "agent.safetensors"
     assert agent.is_file()
-    done = run("ikgym", "evaluate", "--scenarios", "panda-random", "--policies", f"agent:{agent}", "--steps", "5")
+    done = run("ikgym", "evaluate", "--scenarios", "learning-track", "--policies", f"agent:{agent}", "--steps", "5")
     assert "agent" in done.stdout
 
 

@@ -15,7 +15,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.bounds import Bounds
 from baselines.agents.files import AgentFile, load_agent
 from baselines.agents.processing import Held, Processing
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
@@ -64,7 +64,7 @@ class LearnedPolicy(SolverPolicy):
     file: AgentFile = dataclasses.field(init=False, repr=False)
     #: The problem as the agent sees it: with whole poses if it was trained on them.
     seen: Problem = dataclasses.field(init=False, repr=False)
-    #: Bounds of joint velocities that respect the limits of the arm; None if it has none.
+    #: Bounds of joint velocities that respect the limits of the arm; None if it has none, or the agent ignores them.
     bounds: Bounds | None = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
@@ -96,7 +96,8 @@ class LearnedPolicy(SolverPolicy):
             )
         trained = processing.interval
         steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
-        for field, value in {"file": file, "seen": seen, "bounds": Bounds.of(seen), "interval": steps}.items():
+        bounds = Bounds.of(seen) if processing.bounded else None
+        for field, value in {"file": file, "seen": seen, "bounds": bounds, "interval": steps}.items():
             object.__setattr__(self, field, value)
 
     @property
@@ -106,8 +107,7 @@ class LearnedPolicy(SolverPolicy):
 
     @property
     def _offsets(self) -> tuple[int, ...]:
-        offsets: tuple[int, ...] = self.file.processing.offsets  # type: ignore[attr-defined]
-        return offsets
+        return self.file.processing.steps(self.seen)
 
     @property
     def _resolves(self) -> bool:
@@ -166,7 +166,7 @@ class Agent(LearnedPolicy):
 
     def __post_init__(self, given: AgentFile | None) -> None:
         flag("any_arm", self.any_arm)
-        file = given or agent_at(self.path, self.hash, (Bilinear, Relative))
+        file = given or agent_at(self.path, self.hash, (Bilinear, Track))
         self._take(file, any_arm=self.any_arm)
         object.__setattr__(self, "path", os.fspath(self.path))
         object.__setattr__(self, "hash", file.digits)

@@ -34,6 +34,8 @@ class Processing(Frozen, abc.ABC):
 
     #: The name of the class in files.
     kind: ClassVar[str]
+    #: Whether actions are kept within the limits of the arm, as those of the policy `qp`.
+    bounded: ClassVar[bool] = True
     #: Steps from one evaluation of the network to the next in the training.
     interval: int
 
@@ -51,6 +53,10 @@ class Processing(Frozen, abc.ABC):
         """
         known_names("field of the processing", values, ["kind", *_fields(cls)])
         return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if name != "kind"})
+
+    @abc.abstractmethod
+    def steps(self, problem: Problem) -> tuple[int, ...]:
+        """The steps ahead at which the agent sees the reference."""
 
     @abc.abstractmethod
     def size(self, problem: Problem) -> int:

@@ -5,7 +5,6 @@ One file, although long: most of it is the help text of the options.
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import json
 import pathlib
@@ -15,11 +14,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 import tyro
 
 from baselines.agents.bilinear.processing import Bilinear
-from ikgym import scenarios, tasks
+from ikgym import rl, scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
-from ikgym.rl import Learning
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, check_sizes, flag, known_names, number, whole_number
+from ikgym.validation import Frozen, flag, known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
 
@@ -34,8 +32,10 @@ class TrainingError(IkgymError):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Config(Frozen):
-    """The options that all methods share.
+class APG(Frozen):
+    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps.
+
+    The agent is bilinear: its network gives the matrix that maps the remaining twist to joint velocities.
 
     Raises:
         UnknownNameError: There is no such scenario, activation or the like.
@@ -43,7 +43,7 @@ class Config(Frozen):
     """
 
     #: The name of the method on the command line.
-    method: ClassVar[str]
+    method: ClassVar[str] = "apg"
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-random"
     """The scenario to train on. Random scenarios are trained on seeds of the split "train"."""
@@ -53,8 +53,18 @@ class Config(Frozen):
     task: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Task coordinates to train on, if not those of the scenario. An agent trained on whole poses (pose) also plays
     scenarios that show skew coordinates, whose 90° ambiguity is resolved for it."""
-    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 16
-    """Number of arms stepped together, at most 10000."""
+    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
+    """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
+    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
+    """Start from the damped inverse of the Jacobian with this λ; the network adjusts it and adds to it, and sees the
+    joint rates that the reference ahead requires. If left out, the network gives the whole matrix. Not for skew
+    coordinates."""
+    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
+    """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
+    activation: Activation = "silu"
+    """Activation of the hidden layers."""
+    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
+    """Number of arms stepped together, at most 10000. At first they are spread over their episodes."""
     segments: Annotated[int, tyro.conf.arg(metavar="N")] = 20
     """Number of parts of the training. A validation and a checkpoint may follow each of them."""
     evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 2
@@ -63,14 +73,86 @@ class Config(Frozen):
     """Episodes of each validation: the first seeds of the split "validation". A deterministic scenario has one."""
     keep_best: bool = True
     """Keep the agent with the best validation score (geometric mean of the costs) instead of the last one."""
+    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-3
+    """Learning rate of Adam in the first segment."""
+    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-5
+    """Learning rate in the last segment; in between it decays geometrically."""
+    max_grad_norm: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    """Norm at which gradients are clipped."""
+    window: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (64, 120, 240, 480)
+    """Steps through which gradients are back-propagated for one step of Adam: these values in turn, each for an equal
+    part of the segments. The way through a singularity is decided some hundred steps before it, and costs beyond the
+    window have no gradient."""
+    segment_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 1920
+    """Steps of each arm in a segment: a multiple of each window."""
+    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 8
+    """Steps for which the network output is held, with feedback at every step: a divisor of each window."""
+    max_gradient_share: Annotated[float, tyro.conf.arg(metavar="X")] = 10.0
+    """The gradient with respect to the network output of one arm is clipped at this multiple of an equal share of a
+    loss of 1: near singularities it would otherwise exceed that of all other arms together."""
+    cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
+    """Costs are divided by the mean stage cost of their episode up to the end of the window, so that the objective is
+    the logarithm of the costs of whole episodes. The mean cost of the reference joint path counts in it as much as this
+    many steps."""
+    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.3
+    """Arms farther from their reference position than this, in [m], are put back on the reference path."""
+    reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0
+    """The same in the segments of the last window, in which the agent learns to come back from farther away."""
+    averaging: Annotated[float, tyro.conf.arg(metavar="β")] = 0.99
+    """Factor of the exponential moving average of the weights, which is the agent."""
+    init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The agent.safetensors of an earlier run with the first weights; offsets, damping, hidden and activation must be
+    those of that run."""
 
     def __post_init__(self) -> None:
-        self._whole("segments", "evaluate_every")
+        self._whole("segments", "evaluate_every", "hold", "segment_steps")
         self._whole("validation_episodes", at_most=len(scenarios.SPLITS["validation"]))
         self._whole("n_envs", at_most=MOST_ARMS)
         if self.steps is not None:
             self._whole("steps")
         flag("keep_best", self.keep_best)
+        known_names("activation", [self.activation], get_args(Activation))
+        if not isinstance(self.hidden, tuple) or not 1 <= len(self.hidden) <= MOST_LAYERS:
+            raise InvalidInputError(f"hidden: expected 1 to {MOST_LAYERS} layers, got {self.hidden!r}.")
+        self._whole("hidden", at_most=MOST_NEURONS)
+        self._numbers("learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)
+        self._set("offsets", self.processing.offsets)
+        self._set("damping", self.processing.damping)
+        if self.init is not None:
+            self._set("init", pathlib.Path(self.init))
+        if not isinstance(self.window, tuple) or not self.window:
+            raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
+        self._whole("window", at_most=MOST_WINDOW)
+        for steps in self.window:
+            if steps % self.hold or self.segment_steps % steps:
+                raise InvalidInputError(
+                    f"window: expected multiples of hold, {self.hold}, that divide segment_steps, "
+                    f"{self.segment_steps}, got {steps}."
+                )
+        self._numbers("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0)
+        self._numbers("averaging", at_least=0.0, at_most=1.0)
+
+    @property
+    def processing(self) -> Bilinear:
+        """The features and the law of the agent."""
+        return Bilinear(self.offsets, self.damping, self.hold)
+
+    def window_of(self, segment: int) -> int:
+        """The window of a segment, counted from 0."""
+        return self.window[self._stage(segment)]
+
+    def reset_distance_of(self, segment: int) -> float:
+        """The reset distance of a segment, counted from 0, in [m]."""
+        last = self._stage(segment) == len(self.window) - 1
+        return self.reset_distance_end if last else self.reset_distance
+
+    def _stage(self, segment: int) -> int:
+        return segment * len(self.window) // self.segments
+
+    def learning_rate_of(self, segment: int) -> float:
+        """The learning rate of a segment, counted from 0."""
+        part = segment / max(self.segments - 1, 1)
+        return float(self.learning_rate * (self.learning_rate_end / self.learning_rate) ** part)
 
     def make_scenario(self) -> Scenario:
         """The scenario with the options `task` and `steps` applied.
@@ -121,188 +203,57 @@ class Config(Frozen):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ActorOnly(Config):
-    """The options of methods that train a network by Adam, without a critic."""
+class Rewards(Frozen):
+    """The options of the algorithms of Stable-Baselines3.
 
-    hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
-    """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
-    activation: Activation = "silu"
-    """Activation of the hidden layers."""
-    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 1e-3
-    """Learning rate of Adam in the first segment."""
-    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-5
-    """Learning rate in the last segment; in between it decays geometrically."""
-    max_grad_norm: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
-    """Norm at which gradients are clipped."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        known_names("activation", [self.activation], get_args(Activation))
-        if not isinstance(self.hidden, tuple) or not 1 <= len(self.hidden) <= MOST_LAYERS:
-            raise InvalidInputError(f"hidden: expected 1 to {MOST_LAYERS} layers, got {self.hidden!r}.")
-        self._whole("hidden", at_most=MOST_NEURONS)
-        self._numbers("learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)
-
-    def learning_rate_of(self, segment: int) -> float:
-        """The learning rate of a segment, counted from 0."""
-        part = segment / max(self.segments - 1, 1)
-        return float(self.learning_rate * (self.learning_rate_end / self.learning_rate) ** part)
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class APG(ActorOnly):
-    """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps.
-
-    The agent is bilinear: its network gives the matrix that maps the remaining twist to joint velocities.
+    Raises:
+        UnknownNameError: There is no such environment.
+        InvalidInputError: A value is out of its range.
     """
 
-    method: ClassVar[str] = "apg"
+    #: The name of the algorithm on the command line.
+    method: ClassVar[str]
 
-    offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
-    """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
-    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
-    """Start from the damped inverse of the Jacobian with this λ; the network adjusts it and adds to it, and sees the
-    joint rates that the reference ahead requires. If left out, the network gives the whole matrix. Not for skew
-    coordinates."""
-    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 256
-    """Number of arms stepped together, at most 10000. At first they are spread over their episodes."""
-    learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-3
-    """Learning rate of Adam in the first segment."""
-    learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-5
-    """Learning rate in the last segment; in between it decays geometrically."""
-    window: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (64, 120, 240, 480)
-    """Steps through which gradients are back-propagated for one step of Adam: these values in turn, each for an equal
-    part of the segments. The way through a singularity is decided some hundred steps before it, and costs beyond the
-    window have no gradient."""
-    segment_steps: Annotated[int, tyro.conf.arg(metavar="N")] = 1920
-    """Steps of each arm in a segment: a multiple of each window."""
-    hold: Annotated[int, tyro.conf.arg(metavar="N")] = 8
-    """Steps for which the network output is held, with feedback at every step: a divisor of each window."""
-    max_gradient_share: Annotated[float, tyro.conf.arg(metavar="X")] = 10.0
-    """The gradient with respect to the network output of one arm is clipped at this multiple of an equal share of a
-    loss of 1: near singularities it would otherwise exceed that of all other arms together."""
-    cost_prior_steps: Annotated[float, tyro.conf.arg(metavar="N")] = 100.0
-    """Costs are divided by the mean stage cost of their episode up to the end of the window, so that the objective is
-    the logarithm of the costs of whole episodes. The mean cost of the reference joint path counts in it as much as this
-    many steps."""
-    reset_distance: Annotated[float, tyro.conf.arg(metavar="M")] = 0.3
-    """Arms farther from their reference position than this, in [m], are put back on the reference path."""
-    reset_distance_end: Annotated[float, tyro.conf.arg(metavar="M")] = 1.0
-    """The same in the segments of the last window, in which the agent learns to come back from farther away."""
-    averaging: Annotated[float, tyro.conf.arg(metavar="β")] = 0.99
-    """Factor of the exponential moving average of the weights, which is the agent."""
-    init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The agent.safetensors of an earlier run with the first weights; offsets, damping, hidden and activation must be
-    those of that run."""
+    env: Annotated[str, tyro.conf.arg(metavar="ID")]
+    """The environment, such as ikgym/Track-v0."""
+    total_timesteps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Steps of all arms together; n_timesteps of the settings if left out."""
+    minutes: Annotated[float | None, tyro.conf.arg(metavar="X")] = None
+    """CPU time without validations after which a run ends early."""
+    settings: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.yml")] = None
+    """Settings in the format of rl-zoo3; the published ones if left out."""
+    defaults: bool = False
+    """Take the defaults of Stable-Baselines3 and one arm in place of settings."""
+    validations: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    """Rows of the curve, evenly spaced."""
+    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 32
+    """Episodes of a validation."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        self._whole("hold", "segment_steps")
-        self._set("offsets", self.processing.offsets)
-        self._set("damping", self.processing.damping)
-        if self.init is not None:
-            self._set("init", pathlib.Path(self.init))
-        if not isinstance(self.window, tuple) or not self.window:
-            raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("window", at_most=MOST_WINDOW)
-        for steps in self.window:
-            if steps % self.hold or self.segment_steps % steps:
-                raise InvalidInputError(
-                    f"window: expected multiples of hold, {self.hold}, that divide segment_steps, "
-                    f"{self.segment_steps}, got {steps}."
-                )
-        self._numbers("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0)
-        self._numbers("averaging", at_least=0.0, at_most=1.0)
-
-    @property
-    def processing(self) -> Bilinear:
-        """The features and the law of the agent."""
-        return Bilinear(self.offsets, self.damping, self.hold)
-
-    def window_of(self, segment: int) -> int:
-        """The window of a segment, counted from 0."""
-        return self.window[self._stage(segment)]
-
-    def reset_distance_of(self, segment: int) -> float:
-        """The reset distance of a segment, counted from 0, in [m]."""
-        last = self._stage(segment) == len(self.window) - 1
-        return self.reset_distance_end if last else self.reset_distance
-
-    def _stage(self, segment: int) -> int:
-        return segment * len(self.window) // self.segments
+        known_names("environment", [self.env], rl.IDS)
+        for name in ("total_timesteps", "validations", "episodes"):
+            if getattr(self, name) is not None:
+                whole_number(name, getattr(self, name), at_least=1)
+        if self.minutes is not None:
+            number("minutes", self.minutes, above=0.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Reinforcement(Config):
-    """The options of the algorithms of Stable-Baselines3."""
-
-    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "panda-random"
-    """The scenario to train on. Random scenarios are trained on seeds of the split "train"."""
-    n_envs: Annotated[int, tyro.conf.arg(metavar="N")] = 8
-    """Number of arms stepped together, at most 10000."""
-    total_timesteps: Annotated[int, tyro.conf.arg(metavar="N")] = 1_600_000
-    """Steps of the environment in the whole training, summed over all arms."""
-    settings: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="NAME=VALUE …")] = ()
-    """Settings of the algorithm by Stable-Baselines3's names, such as learning_rate=1e-3 or
-    policy_kwargs={'net_arch':[64,64]}. Those left out have the defaults of Stable-Baselines3, except buffer_size, which
-    is at most total_timesteps. A number for action_noise is the standard deviation of normal noise."""
-    learning: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE …")] = ()
-    """Settings of the environment by the names of ikgym.rl.Learning, such as furthest=20.0 or preview=(1,10,40)."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._whole("total_timesteps", at_least=self.segments)
-        _parsed("set", self.settings)
-        Learning().replace(**self.learning_settings)
-
-    @property
-    def algorithm_settings(self) -> dict[str, Any]:
-        """The settings of the algorithm by name."""
-        return _parsed("set", self.settings)
-
-    @property
-    def learning_settings(self) -> dict[str, Any]:
-        """The settings of the environment by name."""
-        return _parsed("learning", self.learning)
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class PPO(Reinforcement):
-    """Proximal policy optimisation (Schulman et al. 2017), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+class PPO(Rewards):
+    """Proximal policy optimisation (Schulman et al. 2017), by Stable-Baselines3 in an environment by id."""
 
     method: ClassVar[str] = "ppo"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class SAC(Reinforcement):
-    """Soft actor-critic (Haarnoja et al. 2018), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+class SAC(Rewards):
+    """Soft actor-critic (Haarnoja et al. 2018), by Stable-Baselines3 in an environment by id."""
 
     method: ClassVar[str] = "sac"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class TD3(Reinforcement):
-    """Twin delayed DDPG (Fujimoto et al. 2018), by Stable-Baselines3 on ikgym.sb3.make_vec."""
+class TD3(Rewards):
+    """Twin delayed DDPG (Fujimoto et al. 2018), by Stable-Baselines3 in an environment by id."""
 
     method: ClassVar[str] = "td3"
-
-
-def _parsed(option: str, settings: tuple[str, ...]) -> dict[str, Any]:
-    """Values by name, read as Python literals, or else as strings.
-
-    Raises:
-        InvalidInputError: A setting does not have the form NAME=VALUE, its name is given twice, or a number is absurd.
-    """
-    out: dict[str, Any] = {}
-    for setting in settings:
-        name, equals, text = str(setting).partition("=")
-        if not name or not equals:
-            raise InvalidInputError(f"{option}: expected NAME=VALUE, got {setting!r}.")
-        if name in out:
-            raise InvalidInputError(f"{option}: {name} is given twice.")
-        try:
-            out[name] = ast.literal_eval(text)
-        except (ValueError, SyntaxError):
-            out[name] = text
-        check_sizes(name, out[name])
-    return out

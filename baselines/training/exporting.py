@@ -15,12 +15,10 @@ from torch import nn
 
 from baselines.agents.files import AgentFile, agent_of, save_agent
 from baselines.agents.network import Network
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError
-from ikgym.rl import Learning
 from ikgym.sb3 import LearningVecEnv
-from ikgym.scenarios.preview import offsets
 
 #: Activations by the names that agents have for them.
 ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
@@ -76,28 +74,26 @@ def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, 
     Raises:
         InvalidInputError: The model is another, or the environment shows more than agents see.
     """
-    if not isinstance(envs.learning, Learning):
-        raise InvalidInputError("envs: expected arms in the wrappers of ikgym.rl.Learning, got an environment by id.")
-    learning, scenario, problem = envs.learning, envs.scenario, Problem.of(envs.scenario)
-    modules, squash = _actor(model.policy)
+    if not isinstance(envs, LearningVecEnv):
+        raise InvalidInputError(f"envs: expected arms of ikgym.sb3.make_vec, got {type(envs).__name__}.")
+    task, scenario, problem = envs.task, envs.scenario, Problem.of(envs.scenario)
     try:
-        network = runtime(modules, "linear")
+        network = runtime(*_actor(model.policy))
     except TypeError as e:
         raise InvalidInputError(f"model: {e}.") from None
-    gain = learning.largest if squash == "tanh" else learning.share
-    processing = Relative(offsets(learning.preview), learning.furthest, learning.largest, gain, squash)  # type: ignore[arg-type]
+    processing = Track(task.ahead, task.share, task.radian, task.zero, task.fine)
     sizes, needed = (network.sizes[0], network.sizes[-1]), (processing.size(problem), processing.outputs(problem))
     if sizes != needed:
         raise InvalidInputError(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
-            f"{sizes[1]}; agents see no history and no commands."
+            f"{sizes[1]}; agents see no history, no commands and no ages of measurements."
         )
-    _check_actions(model, network, squash)
+    _check_actions(model, network)
     return agent_of(network, processing, scenario, training)
 
 
 def _actor(policy: Any) -> tuple[list[nn.Module], str]:
-    """The layers from features to actions, and what keeps actions within their bounds.
+    """The layers from features to actions, and what keeps actions within ±1.
 
     Raises:
         InvalidInputError: The policy is of another kind.
@@ -114,16 +110,13 @@ def _actor(policy: Any) -> tuple[list[nn.Module], str]:
     )
 
 
-def _check_actions(model: BaseAlgorithm, network: Network, squash: str) -> None:
+def _check_actions(model: BaseAlgorithm, network: Network) -> None:
     """Compares the actions of a model with those of its network.
 
     Raises:
         InvalidInputError: They differ: there is more to the model than its layers.
     """
-    space: Any = model.action_space
     features = np.random.default_rng(0).uniform(-1.0, 1.0, (_COMPARED, network.sizes[0])).astype(np.float32)
     found, _ = model.predict(features, deterministic=True)
-    output = network.forward(features)
-    wanted = space.high * np.tanh(output) if squash == "tanh" else np.clip(output, space.low, space.high)
-    if not np.abs(found - wanted).max() <= _NEAR * space.high.max():
+    if not np.abs(found - network.forward(features)).max() <= _NEAR:
         raise InvalidInputError("model: its actions are not those of its layers; a custom features extractor?")

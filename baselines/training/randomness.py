@@ -9,9 +9,6 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from ikgym import scenarios
-from ikgym.exceptions import InvalidInputError
-
 
 def sequence(seed: int, segment: int | None) -> np.random.SeedSequence:
     """The seed sequence of a segment, counted from 0; None stands for the time before the first one."""
@@ -24,19 +21,6 @@ def reseed(seed: int, segment: int | None) -> None:
     random.seed(for_python)
     np.random.seed(for_numpy)  # noqa: NPY002  # what Stable-Baselines3 draws from
     torch.manual_seed(for_torch)
-
-
-def episode_seed(seed: int, segment: int, rows: int) -> int:
-    """The reset seed of the first of `rows` arms in a segment, from the split "train"; the seeds of the others follow.
-
-    Raises:
-        InvalidInputError: There are more arms than seeds.
-    """
-    split = scenarios.SPLITS["train"]
-    if rows > len(split):
-        raise InvalidInputError(f"n_envs: expected at most {len(split)}, got {rows}.")
-    generator = np.random.default_rng(sequence(seed, segment).spawn(1)[0])
-    return int(generator.integers(split.start, split.stop - rows, endpoint=True))
 
 
 @contextlib.contextmanager

@@ -24,11 +24,10 @@ from baselines.agents.files import save_agent
 from baselines.evaluation.metrics import describe
 from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
-from baselines.training.config import Config, TrainingError
+from baselines.training.config import APG, TrainingError
 from baselines.training.folder import FORMAT, Checkpoint, Folder
-from baselines.training.methods import new_trainer
 from baselines.training.randomness import deterministic_torch, reseed
-from baselines.training.trainers.base import SegmentMetrics
+from baselines.training.trainer import SegmentMetrics, Trainer
 from baselines.training.validation import Score, bound, validate
 
 #: Weights above this have diverged.
@@ -48,7 +47,7 @@ class Result:
 
 
 def train(
-    config: Config,
+    config: APG,
     seed: int,
     path: pathlib.Path,
     *,
@@ -61,7 +60,7 @@ def train(
     """Trains an agent.
 
     Args:
-        config: The options of any method.
+        config: The options.
         seed: Determines all randomness.
         path: The folder of the run, see :mod:`baselines.training.folder`.
         resume: Whether to continue the run in the folder, if there is one.
@@ -80,7 +79,7 @@ def train(
 
 
 class _Run:
-    def __init__(self, config: Config, seed: int, folder: Folder, command: str) -> None:
+    def __init__(self, config: APG, seed: int, folder: Folder, command: str) -> None:
         self._config, self._seed, self._folder = config, seed, folder
         self._scenario = config.make_scenario()
         self._at = Checkpoint()
@@ -104,7 +103,7 @@ class _Run:
     def begin(self, *, resume: bool, overwrite: bool) -> None:
         identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "versions")}
         reseed(self._seed, None)
-        self._trainer = new_trainer(self._config, self._scenario, self._seed)
+        self._trainer = Trainer(self._config, self._scenario, self._seed)
         bound(self._trainer.agent(), self._scenario)  # whatever is refused, is refused before files are replaced
         there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
         if there is not None:

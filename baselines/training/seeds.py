@@ -14,7 +14,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.files import check_flags, locked
-from baselines.training.config import Config
+from baselines.training.config import APG
 from baselines.training.folder import Folder
 from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
 from ikgym.exceptions import IkgymError
@@ -69,7 +69,7 @@ class Seed:
     """The job of a worker: one seed.
 
     Args:
-        config: The options of any method.
+        config: The options.
         options: The options of the run.
         command: The command that started the run.
         seed: The seed.
@@ -77,7 +77,7 @@ class Seed:
         remote: Whether a node of a cluster does it.
     """
 
-    config: Config
+    config: APG
     options: RunOptions
     command: str
     seed: int
@@ -86,7 +86,7 @@ class Seed:
 
 
 def train_seeds(
-    config: Config, options: RunOptions, seeds: Sequence[int], *, workers: Workers = ALONE, command: str = ""
+    config: APG, options: RunOptions, seeds: Sequence[int], *, workers: Workers = ALONE, command: str = ""
 ) -> list[SeedResult]:
     """Trains one agent a seed.
 
@@ -95,7 +95,7 @@ def train_seeds(
     checkpoint.
 
     Args:
-        config: The options of any method.
+        config: The options.
         options: The options of the runs.
         seeds: One run each.
         workers: Processes of this machine or of a cluster.
@@ -172,7 +172,7 @@ def train_seed(job: Seed) -> SeedResult:
     except IkgymError as e:
         return SeedResult(seed, error=" ".join(str(e).split()))
     except MemoryError as e:
-        advice = "Choose fewer arms (--n-envs), a smaller network (--hidden), or --set buffer_size=…"
+        advice = "Choose fewer arms (--n-envs) or a smaller network (--hidden)."
         return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())}. {advice}")
     return SeedResult(seed, result.score, result.weights_sha256)
 

@@ -6,26 +6,19 @@
 
 from ikgym.rl import vector
 from ikgym.rl.ids import IDS
-from ikgym.rl.making import Learning, Task, make, make_vec
+from ikgym.rl.making import Task, make, make_vec
 from ikgym.rl.scoring import Score, costs, score
 from ikgym.rl.wrappers import (
-    AgentObservation,
     DistanceReward,
     History,
-    LogReward,
-    RelativeAction,
     ShareAction,
     TrackObservation,
 )
 
 __all__ = [
     "IDS",
-    "AgentObservation",
     "DistanceReward",
     "History",
-    "Learning",
-    "LogReward",
-    "RelativeAction",
     "Score",
     "ShareAction",
     "Task",

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from ikgym.env import RedundantIKEnv
 from ikgym.rl.making import Task
-from ikgym.rl.view import Features
 from ikgym.scenarios import Scenario
 
+Features = npt.NDArray[np.float32]
 Action = npt.NDArray[np.float32]
 
 
@@ -36,7 +36,7 @@ class TaskEnv(gym.Env[Features, Action]):
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
         task = self.task.replace(**changes)
-        self._env = task.arm(task.scenario, render_mode=render_mode)
+        self._env = task.arm(render_mode=render_mode)
         self.render_mode = render_mode
         self.observation_space, self.action_space = self._env.observation_space, self._env.action_space
 
@@ -52,7 +52,7 @@ class TaskEnv(gym.Env[Features, Action]):
         """
         own = {name: options.pop(name) for name in ("autoreset_mode", "max_episode_steps") if name in options}
         task = cls.task.replace(**options)
-        return task.arms(task.scenario, num_envs, render_mode=render_mode, **own)
+        return task.arms(num_envs, render_mode=render_mode, **own)
 
     @property
     def scenario(self) -> Scenario:
@@ -99,7 +99,7 @@ class ReachEnv(TaskEnv):
     """
 
     task, steps, reward_threshold = (
-        Task(scenario="learning-reach", preview=(1,), lost_distance=None, zero=0.3, counted=50),
+        Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, counted=50),
         100,
         60.0,
     )

@@ -10,9 +10,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.rl.feature_kernels import log_rewards
-from ikgym.rl.view import FURTHEST, AgentView
-from ikgym.validation import BoolArray, FloatArray, number, shortened, whole_number
+from ikgym.validation import BoolArray, FloatArray, shortened, whole_number
 
 Rows = npt.NDArray[np.int64]
 #: Values of `info` by key, for the steps that are rewarded. Shape (N,).
@@ -67,62 +65,6 @@ class Stage:
         """
         del told
         return rewards
-
-
-class FeatureStage(Stage):
-    """See :class:`ikgym.rl.AgentObservation`."""
-
-    def __init__(self, env: Any, furthest: float = FURTHEST) -> None:
-        self._view = AgentView(env, furthest)
-        self.observation_space = self._view.space
-
-    def observation(self, observation: Any, begun: BoolArray) -> Any:
-        """The features. Shape (N, f)."""
-        del begun
-        return self._view.see(observation)
-
-    def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
-        """The features of these rows. Shapes (f,)."""
-        del rows
-        features = self._view.see({key: np.array([one[key] for one in observations]) for key in observations[0]})
-        return list(features)
-
-
-class UnitStage(Stage):
-    """See :class:`ikgym.rl.RelativeAction`."""
-
-    def __init__(self, env: Any, share: float = 1.0, largest: float = 1.0, furthest: float = FURTHEST) -> None:
-        self._view, self._limit = AgentView(env, furthest), env.unwrapped.scenario.velocity_limit
-        self._share, largest = number("share", share, above=0.0), number("largest", largest, above=0.0)
-        bound = largest / self._share
-        self.action_space = spaces.Box(-bound, bound, self._limit.shape, np.float32)
-        self._unit = np.zeros(1)
-
-    def observation(self, observation: Any, begun: BoolArray) -> Any:
-        """The observation as it is, from which the unit of the next action follows."""
-        del begun
-        self._unit = self._view.unit(observation)
-        return observation
-
-    def action(self, actions: FloatArray) -> FloatArray:
-        """Fractions of the velocity limit."""
-        fractions: FloatArray = actions * (self._share * self._unit)[:, None] / self._limit
-        return fractions
-
-
-class LogStage(Stage):
-    """See :class:`ikgym.rl.LogReward`."""
-
-    def __init__(self, env: Any, scale: float = 0.05, worst: float = 12.0) -> None:
-        del env
-        self._scale, self._worst = number("scale", scale, above=0.0), number("worst", worst, above=0.0)
-
-    def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
-        """Rewards scale · max(0, 1 − log(1 + stage cost) / worst)."""
-        del told
-        out = np.empty(len(rewards))
-        log_rewards(rewards, self._scale, self._worst, out)
-        return out
 
 
 class HistoryStage(Stage):

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.stages import Rows, Stage, Told
 from ikgym.rl.track_kernels import MOST, distance_rewards, track_rows
 from ikgym.rl.twists import twist_size
-from ikgym.rl.view import own_space
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray, flag, number
+from ikgym.validation import BoolArray, FloatArray, flag, float_array, number, shortened
 
 #: Error in [m] below which an agent gains little more: Δx of the cost.
 UNIT = 1e-3
@@ -25,11 +26,13 @@ OLDEST = 10.0
 class TrackStage(Stage):
     """See :class:`ikgym.rl.TrackObservation`."""
 
-    def __init__(self, env: Any, radian: float, coarse: float, fine: float, context: bool = False) -> None:
+    def __init__(
+        self, env: Any, radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01, context: bool = False
+    ) -> None:
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}
         scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())
-        home, half = middle(scenario)
+        home, half = middle(scenario.model)
         self._fastest = scenario.largest_qdot
         self._command = scenario.task.kind, scenario.model.chain, scales, home, half, self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
@@ -99,14 +102,43 @@ class DistanceStage(Stage):
         return out
 
 
-def middle(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
-    """Home of an arm, and half of the range of its joints, in [rad] or [m]. Shapes (n,).
+def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
+    """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once.
 
     Raises:
-        InvalidInputError: The arm has no home, or a joint has no limits.
+        InvalidInputError: They do not rise from above 0, or there is none.
     """
-    arm = scenario.model
-    half = 0.5 * (arm.upper - arm.lower)
-    if arm.home is None or not np.isfinite(half).all():
-        raise InvalidInputError(f"env: expected an arm with a home and limits of all joints, got {arm.name!r}.")
-    return np.array(arm.home), half  # writable, as all that a kernel is compiled for
+    times = float_array("ahead", ahead)
+    if times.ndim != 1 or not times.size or (np.diff(times, prepend=0.0) <= 0.0).any():
+        raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shortened(ahead)}.")
+    return tuple(dict.fromkeys(max(1, round(time / dt)) for time in times.tolist()))
+
+
+def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
+    """Where joints are seen from, and half of their range, in [rad] or [m]. Shapes (n,).
+
+    Home, or the middle of the range where there is no home, and 0 without a range. Half of a range is π rad or 1 m
+    where there is none.
+    """
+    limited = np.isfinite(arm.upper - arm.lower)
+    lower, upper = (np.where(limited, limit, 0.0) for limit in (arm.lower, arm.upper))
+    half = np.where(limited, 0.5 * (upper - lower), np.where(arm.prismatic, 1.0, math.pi))
+    home = np.clip(0.5 * (lower + upper), arm.lower, arm.upper) if arm.home is None else np.array(arm.home)
+    return home, half
+
+
+def own_space(env: Any) -> spaces.Dict:
+    """The observation space of one row of an environment of this package.
+
+    Raises:
+        InvalidInputError: The environment is another, or its observation has been changed.
+    """
+    if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
+        raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
+    name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
+    space, own = getattr(env, name), getattr(env.unwrapped, name)
+    if space != own:
+        got = f"a {type(space).__name__} of shape {space.shape}"
+        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {got}.")
+    found: spaces.Dict = own
+    return found

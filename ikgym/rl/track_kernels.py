@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
@@ -43,7 +44,8 @@ def track_rows(kind, chain, scales, home, half, fastest, q, qdot, pose, nominal,
             if turned:
                 turn(chain.axes[0], -q[row, 0], missing)
             for a in range(w):
-                distance = missing[a] if a < 3 else radian * missing[a]
+                turning = (a < 3) == (kind == task_kernels.SKEW)  # skew coordinates begin with the orientation
+                distance = radian * missing[a] if turning else missing[a]
                 out[row, at + a] = min(max(distance / coarse, -MOST), MOST)
                 out[row, at + w + a] = math.tanh(distance / fine)
             at += 2 * w

@@ -31,15 +31,6 @@ def is_turned(kind, prismatic):
 
 
 @kernel
-def shown_joints(kind, prismatic):
-    """Number of features of joint coordinates: one for a prismatic joint, two for a revolute one."""
-    shown = 0
-    for j in range(1 if is_turned(kind, prismatic) else 0, prismatic.shape[0]):
-        shown += 1 if prismatic[j] else 2
-    return shown
-
-
-@kernel
 def twist(kind, nominal, coordinates, error, out):
     """The motion from one pose to another.
 

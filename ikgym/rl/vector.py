@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from ikgym.rl.stages import FeatureStage, HistoryStage, LogStage, Stage, UnitStage, checked_actions
+from ikgym.rl.stages import HistoryStage, Stage, checked_actions
 from ikgym.rl.track import DistanceStage, ShareStage, TrackStage
 from ikgym.scenarios import Scenario
 from ikgym.validation import BoolArray, FloatArray
@@ -77,24 +77,6 @@ class ArmsWrapper(VectorWrapper[Any, Any, Any, Any, Any]):
                 final[row] = last
         self._ended = ended
         return self._stage.observation(observation, begun), rewards, terminated, truncated, infos
-
-
-class AgentObservation(ArmsWrapper):
-    """:class:`ikgym.rl.AgentObservation` of N arms: features of shape (N, f)."""
-
-    stage = FeatureStage
-
-
-class RelativeAction(ArmsWrapper):
-    """:class:`ikgym.rl.RelativeAction` of N arms."""
-
-    stage = UnitStage
-
-
-class LogReward(ArmsWrapper):
-    """:class:`ikgym.rl.LogReward` of N arms."""
-
-    stage = LogStage
 
 
 class History(ArmsWrapper):

@@ -8,10 +8,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from ikgym.kernels.outcome import Observation
-from ikgym.rl.stages import FeatureStage, HistoryStage, LogStage, Stage, UnitStage, checked_actions, one_row
+from ikgym.rl.stages import HistoryStage, Stage, checked_actions, one_row
 from ikgym.rl.track import DistanceStage, ShareStage, TrackStage
-from ikgym.rl.view import FURTHEST, Features
 
 FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
 
@@ -49,98 +47,8 @@ class ArmWrapper(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     def _seen(self, observation: Any, begun: Any) -> Any:
         if self._stage.observation_space is None:
-            self._stage.observation(one_row(observation), begun)
             return observation
         return self._stage.observation(one_row(observation), begun)[0]
-
-
-class AgentObservation(ArmWrapper):
-    """The observation as a learning agent sees it: bounded numbers without a scale, of shape (f,), float32.
-
-    With the steps ahead o_1 < o_2 < … that the environment shows (its `preview`), the mean twists v_i of the reference
-    from o_i to o_(i+1), their speed s = 0.02 + their root mean square, and the twist v that brings the arm to the
-    reference pose at o_1 in that time, v̂ = v / s:
-
-    | size | feature |
-    |---|---|
-    | w | v̂ / (0.2 + |v̂|), with |v̂| clipped at `furthest` |
-    | 1 | 0.2 / (0.2 + |v̂|) |
-    | n or 2 n | v̂ / (0.2 + |v̂|) times each joint's column of the Jacobian, clipped at ±10; position in \
-units of a quarter of the arm's length, and orientation apart |
-    | n | joint velocities in units of s (0.2 + |v̂|), clipped at ±4 |
-    | 2 each | sin q_j and cos q_j of revolute joints; without joint 1 where twists are seen from its frame |
-    | 1 each | q_j of prismatic joints |
-    | w each | v_i / s |
-    | 1 | ln s |
-    | 1 | steps left, as a share of 500, at most 1; all features from the sines up to here are multiplied by 0.3 |
-    | 1 each | ages of `q` and `pose` as a share of 100 steps, where sensors are slow or late |
-    | h n | the last h commands, in the unit of the joint velocities, where the environment shows them |
-
-    Twists have w components: 3 for tasks of position alone, else 6. They are expressed in the frame of joint 1, so that
-    a turn of joint 1 changes none of them. Where joint 1 is prismatic, and for skew coordinates, which are no vector,
-    they are expressed in the base frame.
-
-    Args:
-        env: The environment, whose observation no other wrapper has changed.
-        furthest: Bound of |v̂|, above 0.
-
-    Raises:
-        InvalidInputError: The environment shows less than two reference poses, or `furthest` is out of its range.
-    """
-
-    def __init__(self, env: gym.Env[Any, Any], furthest: float = FURTHEST) -> None:
-        super().__init__(env, FeatureStage(env, furthest), furthest=furthest)
-
-    def observation(self, observation: Observation) -> Features:
-        """The features of an observation. Shape (f,)."""
-        features: Features = self._seen(observation, LATER)
-        return features
-
-
-class RelativeAction(ArmWrapper):
-    """Actions relative to the required speed: joint velocity = action · share · s (0.2 + |v̂|).
-
-    s and v̂ are those of :class:`AgentObservation`. The same action moves a slow arm slowly and a fast one fast, and
-    exploration noise is in proportion to the velocity that is needed. The environment clips a joint velocity that is
-    beyond its limit.
-
-    Args:
-        env: The environment, whose observation no other wrapper has changed.
-        share: Share of the unit that an action of 1 means, above 0; some libraries explore with a standard deviation
-            of 1.
-        largest: Bound of the velocities in units, above 0; actions are clipped to ±largest / share.
-        furthest: Bound of |v̂|, above 0.
-
-    Raises:
-        InvalidInputError: As in :class:`AgentObservation`, or a parameter is out of its range.
-    """
-
-    def __init__(
-        self, env: gym.Env[Any, Any], share: float = 1.0, largest: float = 1.0, furthest: float = FURTHEST
-    ) -> None:
-        stage = UnitStage(env, share, largest, furthest)
-        super().__init__(env, stage, share=share, largest=largest, furthest=furthest)
-
-
-class LogReward(ArmWrapper):
-    """Rewards from the logarithm of the stage cost.
-
-        reward = scale · max(0, 1 − log(1 + stage cost) / worst)
-
-    Stage costs span ten decades, and a critic that must distinguish 1 from 2 cannot also represent 1e9. No reward is
-    negative, so an agent never gains by ending an episode.
-
-    Args:
-        env: The environment, possibly wrapped.
-        scale: Reward of a step without cost, above 0.
-        worst: Logarithm of the cost from which on the reward is 0, above 0.
-
-    Raises:
-        InvalidInputError: A parameter is out of its range.
-    """
-
-    def __init__(self, env: gym.Env[Any, Any], scale: float = 0.05, worst: float = 12.0) -> None:
-        super().__init__(env, LogStage(env, scale, worst), scale=scale, worst=worst)
 
 
 class History(ArmWrapper):
@@ -150,7 +58,7 @@ class History(ArmWrapper):
     beginning of an episode its first observation is repeated.
 
     Args:
-        env: An environment whose observation is a vector, for example behind :class:`AgentObservation`.
+        env: An environment whose observation is a vector, for example behind :class:`TrackObservation`.
         length: Number of observations, at least 1.
 
     Raises:
@@ -175,7 +83,9 @@ class TrackObservation(ArmWrapper):
     | c | the context of the episode, from -1 to 1, with `context` |
 
     Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
-    joint 1, as in :class:`AgentObservation`.
+    joint 1, so that a turn of joint 1 changes none of them; from the base frame where joint 1 is prismatic, and for
+    skew coordinates, which are no vector. Without a home joints are seen from the middle of their range, or from 0;
+    half of a range is π rad or 1 m where a joint has none.
 
     Args:
         env: The environment, whose observation no other wrapper has changed.
@@ -185,8 +95,8 @@ class TrackObservation(ArmWrapper):
         context: Whether the context of the episode is shown.
 
     Raises:
-        InvalidInputError: A parameter is out of its range, the arm has no home or a joint without limits, or the plant
-            draws nothing from ranges.
+        InvalidInputError: A parameter is out of its range, the observation was changed, or the plant draws nothing from
+            ranges.
     """
 
     def __init__(

@@ -17,11 +17,6 @@ from ikgym.validation import FloatArray, float_array, one_a_row, shortened
 Steps = npt.NDArray[np.int64]
 
 
-def has_joint_path(scenario: Scenario) -> bool:
-    """Whether the reference trajectory is a joint path, on which episodes can be entered."""
-    return scenario.trajectory.joint_bound() is not None
-
-
 def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> FloatArray | None:
     """Starts chosen by the user.
 
@@ -72,7 +67,7 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
         raise InvalidInputError(
             f"options['step']: expected steps below the {scenario.steps} of the episode, got {max(checked)}."
         )
-    if any(checked) and not has_joint_path(scenario):
+    if any(checked) and scenario.trajectory.joint_bound() is None:
         raise InvalidInputError(
             f"options['step']: expected a scenario whose reference trajectory is a joint path, so that it says where "
             f"the arm is after {max(checked)} steps; that of {scenario.name!r} is a path of the tool."

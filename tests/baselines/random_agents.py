@@ -8,10 +8,11 @@ import numpy as np
 from baselines.agents.files import agent_of, save_agent
 from baselines.agents.network import Network
 from baselines.agents.processing import Held
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.policy import Problem
 
-OFFSETS = (1, 2, 5, 20)
+#: Times in [s], and the same as steps of 1 ms.
+AHEAD, OFFSETS = (0.001, 0.002, 0.005, 0.02), (1, 2, 5, 20)
 
 
 def network(sizes, activation="silu", squash="linear", *, zero=False, seed=0):
@@ -27,7 +28,7 @@ def network(sizes, activation="silu", squash="linear", *, zero=False, seed=0):
 
 def random_agent(scenario, *, zero=False, hidden=(16, 9), seed=0, training=None, processing=None):
     """An agent in memory that fits a scenario."""
-    processing, problem = processing or Relative(OFFSETS, furthest=5.0, largest=2.0), Problem.of(scenario)
+    processing, problem = processing or Track(AHEAD), Problem.of(scenario)
     sizes = (processing.size(problem), *hidden, processing.outputs(problem))
     return agent_of(network(sizes, zero=zero, seed=seed), processing, scenario, training)
 

@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 
 from baselines import tuning
 from baselines.agents.files import load_agent
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.evaluation.results import read_rows
 from baselines.solvers.rivals.model_files import urdf
-from baselines.training.config import APG
 from baselines.training.methods import configure
 from ikgym import arms, scenarios
 from ikgym.exceptions import IkgymError
@@ -44,11 +43,11 @@ TIMELESS = b"x,y,z\n1,2,3\n4,5.5,6\n7,8,9e-1\n"
 #: Functions that read a file of a user, by the endings of the files.
 READERS = {
     "scenario.toml": scenarios.load,
-    "preset.toml": lambda file: configure(APG, str(file)),
+    "preset.toml": lambda file: configure(str(file)),
     "ranges.toml": tuning.read,
     "points.csv": from_csv,
     "arm.urdf": arms.from_urdf,
-    "it.safetensors": lambda file: load_agent(file, (Relative,)),
+    "it.safetensors": lambda file: load_agent(file, (Track,)),
     "results.json": read_rows,
 }
 

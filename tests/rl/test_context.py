@@ -10,7 +10,7 @@ from ikgym.rl import Task
 from tests.comparison import identical
 
 SCENARIO = ikgym.scenarios.get("learning-context").replace(steps=7)
-SHOWN = Task(context=True, lost_distance=None)
+SHOWN = Task(SCENARIO, context=True, lost_distance=None)
 N = 3
 
 
@@ -21,8 +21,8 @@ def context(seed):
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
 def test_single_synchronous_and_native_agree(mode):
     task = SHOWN.replace(history=2)
-    native = task.arms(SCENARIO, N, autoreset_mode=mode)
-    sync = SyncVectorEnv([lambda: task.arm(SCENARIO)] * N, autoreset_mode=mode)
+    native = task.arms(N, autoreset_mode=mode)
+    sync = SyncVectorEnv([lambda: task.arm()] * N, autoreset_mode=mode)
     assert native.observation_space == sync.observation_space
     assert identical(native.reset(seed=4), sync.reset(seed=4))
     rng = np.random.default_rng(0)
@@ -34,7 +34,7 @@ def test_single_synchronous_and_native_agree(mode):
 
 
 def test_the_context_ends_the_observation_and_is_that_of_the_plant():
-    shown, hidden = (Task(context=one).arm(SCENARIO) for one in (True, False))
+    shown, hidden = (Task(SCENARIO, context=one).arm() for one in (True, False))
     for seed in (3, 4):
         (seen, info), (other, same) = shown.reset(seed=seed), hidden.reset(seed=seed)
         np.testing.assert_array_equal(seen, [*other, *context(seed)])
@@ -45,7 +45,7 @@ def test_the_context_ends_the_observation_and_is_that_of_the_plant():
 
 
 def test_last_observations_have_the_context_of_their_own_episodes():
-    envs = SHOWN.arms(SCENARIO, N, autoreset_mode="SameStep")
+    envs = SHOWN.arms(N, autoreset_mode="SameStep")
     envs.reset(seed=4)
     for _ in range(SCENARIO.steps):
         seen, *_, infos = envs.step(np.zeros((N, 7)))

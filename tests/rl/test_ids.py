@@ -21,6 +21,7 @@ import ikgym.sb3
 from baselines.episodes import play
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
+from ikgym.rl.track import steps_ahead
 from tests.rl.test_wrappers import played, same_bits
 
 N = 3
@@ -135,7 +136,8 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
     env.reset(seed=11)
     infos = [env.step(action)[-1] for action in actions]
     fractions = iter(actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit))
-    outcomes = play(scenario, [11], lambda _: next(fractions)[None], preview=task.preview, commands=task.commands)
+    ahead = steps_ahead(task.ahead, scenario.dt)
+    outcomes = play(scenario, [11], lambda _: next(fractions)[None], preview=ahead, commands=task.commands)
     for info, out in zip(infos, outcomes, strict=False):
         assert info["tracking_cost"] == out.tracking_cost[0]
         assert info["velocity_cost"] == out.velocity_cost[0]

@@ -1,7 +1,6 @@
 """Wrappers for learning: one by one, all of them, and N arms at once, bit for bit."""
 
 import itertools
-import math
 import warnings
 
 import gymnasium as gym
@@ -13,10 +12,9 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import ikgym
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
-from ikgym.rl.feature_kernels import MOST, radian
+from ikgym.rl.track import middle
 
 N = 3
-PREVIEW = (10, 40, 100)
 
 
 def short(name="varga7-random", steps=20):
@@ -43,15 +41,17 @@ def same_bits(left, right):
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
-@pytest.mark.parametrize(("name", "distance"), [("varga7-random", 0.02), ("panda-camera-slow", 0.0003)])
-def test_native_is_sync_of_singles_bit_for_bit(name, distance, mode):
-    scenario, changes = short(name), {"lost_distance": distance, "history": 2, "commands": 2}
+@pytest.mark.parametrize(
+    ("name", "distance", "share"), [("varga7-random", 0.05, 0.02), ("panda-camera-slow", 0.0003, 0.6)]
+)
+def test_native_is_sync_of_singles_bit_for_bit(name, distance, share, mode):
+    scenario, changes = short(name), {"lost_distance": distance, "share": share, "history": 2, "commands": 2}
     native = rl.make_vec(scenario, N, autoreset_mode=mode, **changes)
     sync = SyncVectorEnv([lambda: rl.make(scenario, **changes)] * N, autoreset_mode=mode)
     assert native.autoreset_mode is sync.autoreset_mode is mode  # TorchRL asks the wrapper itself
     assert native.single_observation_space == sync.single_observation_space
     assert native.single_action_space == sync.single_action_space
-    actions = np.random.default_rng(0).uniform(-5.0, 5.0, (50, N, 7)).astype(np.float32)
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (50, N, 7)).astype(np.float32)
     lost = over = 0
     for ours, theirs in itertools.zip_longest(played(native, actions), played(sync, actions)):
         assert same_bits(ours, theirs)
@@ -62,16 +62,8 @@ def test_native_is_sync_of_singles_bit_for_bit(name, distance, mode):
     assert over > 0
 
 
-@pytest.mark.parametrize("wrapper", [rl.AgentObservation, rl.RelativeAction, rl.LogReward])
-def test_each_wrapper_stands_on_its_own(wrapper):
-    env = wrapper(gym.make("RedundantIK-v0", scenario=short(), preview=PREVIEW, lost_distance=0.05))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # boxes that are not of unit length, tables in an observation
-        check_env(env, skip_render_check=True)
-
-
 def test_history_stands_newest_first():
-    env = rl.History(rl.AgentObservation(gym.make("RedundantIK-v0", scenario=short(), preview=PREVIEW)), 3)
+    env = rl.make(short(), history=3)
     first = env.reset(seed=0)[0].reshape(3, -1)
     assert (first == first[0]).all()
     second = env.step(np.ones(7, dtype=np.float32))[0].reshape(3, -1)
@@ -84,59 +76,47 @@ def test_history_stands_newest_first():
 def test_gymnasium_accepts_what_is_made():
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*different from the unwrapped version.*")
-        warnings.filterwarnings("ignore", message=".*We recommend .* symmetric and normalized.*")
         check_env(rl.make(short()), skip_render_check=True)
 
 
-def test_actions_are_in_the_unit_of_what_is_asked_for():
-    scenario = ikgym.scenarios.get("varga7-random")
-    plain = ikgym.RedundantIKEnv(scenario, preview=PREVIEW)
-    env = rl.RelativeAction(ikgym.RedundantIKEnv(scenario, preview=PREVIEW), share=0.5, furthest=5.0)
-    agent = rl.AgentObservation(plain, furthest=5.0)
-    features, _ = agent.reset(seed=1, options={"step": 300})
-    env.reset(seed=1, options={"step": 300})
-    n, w = 7, 6
-    due, share, seen = features[:w], features[w], features[3 * n : 4 * n]
-    # The direction is v̂ / (0.2 + |v̂|), beside 0.2 / (0.2 + |v̂|): together they have a length of 1.
-    assert math.isclose(np.linalg.norm(due) + share, 1.0, rel_tol=1e-6)
-    moved, *_ = env.step(np.ones(n, dtype=np.float32))
-    before = env.unwrapped.scenario.nominal_joint_path(1)
-    assert np.allclose(moved["qdot"], moved["qdot"][0])  # every joint the same velocity
-    velocity = (before[300] - before[299]) / scenario.dt
-    unit = moved["qdot"][0] / 0.5
-    assert np.allclose(seen, np.clip(velocity / unit, -4.0, 4.0), atol=1e-5)
+@pytest.mark.parametrize(("dt", "steps"), [(0.01, (1, 5)), (0.001, (10, 50)), (0.02, (1, 2)), (1.0, (1,))])
+def test_the_reference_is_shown_at_times_ahead(dt, steps):
+    env = rl.make(ikgym.scenarios.get("panda-random").replace(dt=dt, steps=20))
+    assert env.unwrapped.preview == steps
+    assert env.observation_space.shape == (2 * (7 + 6 * len(steps)),)
 
 
-@pytest.mark.parametrize(("name", "turned"), [
-    ("varga7-random", False), ("varga7-pose-random", True), ("tiago-turn", False), ("panda-random", True),
-])  # fmt: skip
-def test_what_joints_can_do_is_their_column_of_the_jacobian_times_what_is_due(name, turned):
-    env = ikgym.RedundantIKEnv(name, preview=PREVIEW)
-    env.reset(seed=2)
-    seen, *_ = env.step(np.full(env.action_space.shape, 0.5, dtype=np.float32))
-    scenario, agent = env.scenario, rl.AgentObservation(env)
-    features = agent.observation(seen).astype(np.float64)
-    assert agent.observation_space.contains(features.astype(np.float32))
-    rotation, _, jacobian = scenario.model.forward_and_jacobian(seen["q"])
-    if scenario.task.name == "skew":
-        jacobian = scenario.task.jacobian(rotation, jacobian)
-    due, n = features[:6].reshape(2, 3), scenario.joints
-    if turned:
-        due = due @ ikgym.kernels.rotations.rodrigues(scenario.model.chain.axes[0], seen["q"][0]).T
-    unit = radian(scenario.model.chain)
-    products = np.concatenate([jacobian[:3].T @ due[0] / unit**2, jacobian[3:].T @ due[1]]).clip(-MOST, MOST)
-    assert np.allclose(features[7 : 7 + 2 * n], products, atol=1e-6)
-    assert np.ptp(products) > 0.1
+@pytest.mark.parametrize("task", ikgym.tasks.names())
+@pytest.mark.parametrize("name", ["varga7-random", "tiago-turn"])
+def test_what_an_arm_sees_of_a_task(name, task):
+    """Before a step in which the arm stands still: the errors of that step, seen from joint 1."""
+    scenario = ikgym.scenarios.get(name).replace(task=ikgym.tasks.get(task))
+    env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, radian=0.5, lost_distance=None)
+    arm = scenario.model
+    start = np.where(arm.prismatic, 0.2, 0.3) if arm.home is None else np.array(arm.home) + 0.1
+    features, _ = env.reset(seed=3, options={"q": start})
+    *_, info = env.step(np.zeros(arm.joints, dtype=np.float32))
+    units = 50.0 * features[2 * arm.joints :].reshape(2, -1)[0]
+    coarse = np.roll(units, 3) if task == "skew" else units  # it begins with the orientation
+    assert np.linalg.norm(coarse[:3]) == pytest.approx(info["position_error"], rel=1e-5)
+    if task not in ("position", "skew"):
+        assert np.linalg.norm(coarse[3:]) == pytest.approx(0.5 * info["orientation_error"], rel=1e-5)
+    missing = scenario.nominal(3)[1][-3:] - arm.forward(start)[1]
+    if task != "skew" and not arm.prismatic[0]:
+        missing = ikgym.kernels.rotations.rodrigues(arm.chain.axes[0], -start[0]) @ missing
+    np.testing.assert_allclose(coarse[:3], missing, rtol=1e-5, atol=1e-6)
+    fine = np.tanh(units / 0.01)
+    np.testing.assert_allclose(features[2 * arm.joints :].reshape(2, -1)[1], fine, atol=1e-3)
 
 
-def test_rewards_are_what_the_logarithm_of_the_cost_leaves():
-    kept = {"scenario": short(), "preview": PREVIEW, "lost_distance": 0.05}
-    action = np.full(7, 0.02, dtype=np.float32)
-    plain, env = gym.make("RedundantIK-v0", **kept), rl.LogReward(gym.make("RedundantIK-v0", **kept), 0.1, 14.0)
-    plain.reset(seed=0), env.reset(seed=0)
-    lost, rewards = False, []
-    while not lost:
-        _, cost, lost, *_ = plain.step(action)
-        rewards.append(env.step(action)[1])
-        assert math.isclose(rewards[-1], 0.1 * max(0.0, 1.0 - math.log1p(-cost) / 14.0), rel_tol=1e-12)
-    assert 0.0 <= rewards[-1] < rewards[0] < 0.1
+def test_joints_are_seen_from_home_or_the_middle_of_their_range():
+    panda, unlimited = ikgym.arms.get("panda"), ikgym.arms.get("varga7")
+    home, half = middle(panda)
+    assert np.array_equal(home, panda.home)
+    assert np.array_equal(half, 0.5 * (panda.upper - panda.lower))
+    assert np.array_equal(middle(panda.replace(home=None))[0], 0.5 * (panda.upper + panda.lower))
+    home, half = middle(unlimited)
+    assert not home.any()
+    assert np.array_equal(half, np.where(unlimited.prismatic, 1.0, np.pi))
+    one_sided = unlimited.replace(lower=[0.5, *[-np.inf] * 6])
+    assert middle(one_sided)[0].tolist() == [0.5, *[0.0] * 6]

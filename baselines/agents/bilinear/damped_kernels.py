@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.bilinear.features import seen_jacobian
 from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.kernels.jit import expanded, inlined, inner, kernel
-from ikgym.rl.feature_kernels import seen_jacobian
 from ikgym.rl.twists import is_turned, twist_size
 
 Floats = npt.NDArray[np.float64]
@@ -33,7 +33,7 @@ class Inverse(NamedTuple):
     """The damped inverse of one arm, and its parts.
 
     Attributes:
-        jacobian: J, as :func:`ikgym.rl.feature_kernels.seen_jacobian` gives it. Shape (6, n).
+        jacobian: J, as :func:`baselines.agents.bilinear.features.seen_jacobian` gives it. Shape (6, n).
         metric: The diagonal of U. Shape (n,).
         inverse: M⁻¹, with M = J U Jᵀ + λ I. Shape (w, w).
         products: M⁻¹ J. Shape (w, n).

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.features import context_rows, mean_twists
 from baselines.agents.bilinear.rates import metric_rows, rate_rows
 from baselines.agents.network import forward_rows
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.rl.feature_kernels import context_rows, mean_twists
 from ikgym.rl.twists import is_turned, turn, turn_gradient, twist, twist_size
 
 
@@ -44,7 +44,7 @@ def feature_gradient_rows(kind, prismatic, axis, twists, features, gradient, out
         prismatic: Shape (n,).
         axis: Shape (3,).
         twists: How many are seen ahead.
-        features: As :func:`ikgym.rl.feature_kernels.context_rows` gives them. Shape (B, f).
+        features: As :func:`baselines.agents.bilinear.features.context_rows` gives them. Shape (B, f).
         gradient: With respect to the features. Shape (B, f).
         out: Receives the gradient. Shape (B, n).
     """

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.bilinear.features import shown_joints
 from baselines.agents.bilinear.kernels import law_rows
 from baselines.agents.network import Network
 from baselines.agents.processing import Held, Processing, check_offsets
@@ -16,7 +17,7 @@ from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.outcome import OBSERVED
-from ikgym.rl.twists import shown_joints, twist_size
+from ikgym.rl.twists import twist_size
 from ikgym.validation import FloatArray, number, whole_number
 
 
@@ -30,8 +31,8 @@ class Bilinear(Processing):
     the root mean square of the mean twists shown, and h s moves the arm in its null space. (G, h) depend on the joint
     coordinates and on the reference trajectory, and change slowly: they may be held for some steps.
 
-    The features are those of :func:`ikgym.rl.feature_kernels.context_rows`, which :class:`ikgym.rl.AgentObservation`
-    shows, too. With the offsets o_1 < o_2 < … and v_i the mean twist from o_i to o_(i+1), of w components:
+    The features are those of :func:`baselines.agents.bilinear.features.context_rows`. With the offsets o_1 < o_2 < …
+    and v_i the mean twist from o_i to o_(i+1), of w components:
 
     | number | feature |
     |---|---|
@@ -95,6 +96,11 @@ class Bilinear(Processing):
         if bool(own.pop("predicted_rates")) != (own.get("damping") is not None) or not own.pop("matrix"):
             raise InvalidInputError("damping: expected it together with predicted rates and a matrix.")
         return super().from_json(own)
+
+    def steps(self, problem: Problem) -> tuple[int, ...]:
+        """See :meth:`Processing.steps`."""
+        del problem
+        return self.offsets
 
     def size(self, problem: Problem) -> int:
         """The number of features."""

@@ -18,13 +18,13 @@ import math
 
 import numpy as np
 
+from baselines.agents.bilinear.features import CONTEXT, shown_joints
 from baselines.solvers.linear_algebra import damped_step
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import within
-from ikgym.rl.feature_kernels import CONTEXT
-from ikgym.rl.twists import shown_joints, twist, twist_size
+from ikgym.rl.twists import twist, twist_size
 
 #: λ of the joint rates, which bounds them near a singularity.
 DAMPING = 1e-2

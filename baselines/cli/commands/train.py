@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib.util
+import inspect
 import itertools
 import pathlib
 import shlex
@@ -14,15 +15,15 @@ from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
 
-from baselines.cli import shell, train_by_id
+from baselines.cli import shell
 from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
 from baselines.training import methods
-from baselines.training.config import Config, TrainingError
+from baselines.training.config import APG, Rewards, TrainingError
 from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, SeedResult, train_seeds
 from baselines.workers import Workers
-from ikgym import scenarios
+from ikgym import rl, scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.validation import known_name, whole_number
 
@@ -43,15 +44,26 @@ class Options(RunOptions):
     """Options of a preset, or of a file NAME.toml; those on the command line take precedence."""
 
 
-C = TypeVar("C", bound=Config)
-
-
 @dataclasses.dataclass(frozen=True)
-class Command(Generic[C]):
-    """A method with its configuration."""
+class Command:
+    """A training by gradients."""
+
+    config: Annotated[APG, tyro.conf.arg(name="")]
+    options: Annotated[Options, tyro.conf.arg(name="")]
+
+
+C = TypeVar("C", bound=Rewards)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ByRewards(Generic[C]):
+    """A training by rewards."""
 
     config: Annotated[C, tyro.conf.arg(name="")]
-    options: Annotated[Options, tyro.conf.arg(name="")]
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
+    """One run each, one after the other; the same command goes on with those that have not ended."""
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder of the runs; that with seed N has the folder seed-N in it."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -71,6 +83,7 @@ RULES = (
         lambda given: len(given.config.window) > 1,
         "with one --window, which is also the last: see --reset-distance-end",
     ),
+    Rule(("--settings",), lambda given: not given.config.defaults, "with --defaults"),
     if_random("--validation-episodes", lambda given: given.config.scenario),
 )
 
@@ -79,25 +92,33 @@ def manual() -> str:
     """The text of ``--help`` above the options."""
     prog, evaluate = _program(), shell.program("evaluate", "python -m baselines.evaluate")
     return f"""\
-Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm, ppo, sac and
-td3 are the algorithms of Stable-Baselines3 on ikgym.sb3.make_vec. Each method has its own options: {prog} METHOD --help
+Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm in any
+scenario; ppo, sac and td3 are those of Stable-Baselines3, unmodified, in an environment by id. Each method has its own
+options: {prog} METHOD --help
 
 {shell.listing("Methods", methods.METHODS)}
 
-{shell.listing("Presets", methods.preset_names())}
+{shell.listing("Environments of ppo, sac, td3", rl.IDS)}
 
-{shell.listing("Scenarios", scenarios.names())}
+{shell.listing("Presets of apg", methods.preset_names())}
+
+{shell.listing("Scenarios of apg", scenarios.names())}
 
 Examples:
   {prog} apg --preset quick --out runs/apg
   {prog} apg --preset standard --seeds 0 1 2 --workers 2 --out runs/apg
-  {prog} ppo --total-timesteps 200000 --set n_steps=256 learning_rate=3e-4 --out runs/ppo
-  {prog} sac --scenario panda-random --learning furthest=20.0 --out runs/sac
-  {prog} ppo --env ikgym/Track-v0 --out runs/track    (other options, see {prog} ppo --env ID --help)
   {prog} apg --preset quick --out runs/apg --resume
   {prog} repeat runs/apg/seed-0/run.json --out runs/again
+  {prog} ppo --env ikgym/Track-v0 --minutes 10 --seeds 0 1 2 --out runs/track-ppo
+  {prog} sac --env ikgym/Reach-v0 --total-timesteps 100000 --out runs/reach-sac
 
-Files in the folder of a run, which may be killed at any time:
+Files of a run of ppo, sac or td3, in seed-N:
+  model.zip          the model, for Stable-Baselines3
+  agent.safetensors  the agent, for: {evaluate} --policies agent:FILE; none with a history
+  curve.csv          CPU seconds, steps, and score on validation episodes: 0 standing still, 1 tuned dls
+  run.json           at the end: settings, seed and final score
+
+Files of a run of apg, which may be killed at any time:
   run.json           options, seed, versions, validations, computing time, hash of the final weights
   history.json       a row for each segment
   tensorboard/       the same, for: tensorboard --logdir DIR
@@ -119,8 +140,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         130 after Ctrl-C.
     """
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if any(word.partition("=")[0] == "--env" for word in arguments):
-        return train_by_id.main(arguments)
     out: pathlib.Path | None = None
 
     def work() -> int:
@@ -130,6 +149,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(command, Repeat):
             out = command.out
             return _repeat(command)
+        if isinstance(command, ByRewards):
+            return _train_by_rewards(command)
         out = command.options.out
         return _train(command, shlex.join([*_program().split(), *arguments]))
 
@@ -155,11 +176,11 @@ def _require_extra() -> None:
         raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
 
 
-def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
+def parse(arguments: Sequence[str]) -> Command | ByRewards[Any] | Repeat:
     """The command in a command line.
 
     Raises:
-        UnknownNameError: There is no such method or preset, or the method has no option of the preset.
+        UnknownNameError: There is no such method, preset or environment, or no option of the preset.
         InvalidInputError: A value is refused, an option is unknown or has no effect, or there is no method.
         SystemExit: With 0 after ``--help``.
     """
@@ -171,15 +192,20 @@ def parse(arguments: Sequence[str]) -> Command[Any] | Repeat:
         raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got {chosen}.")
     if not chosen.startswith("-"):
         known_name("method", chosen, (*methods.METHODS, "repeat"))
-    preset = _value_of("--preset", arguments)
-    kinds: list[Any] = []
-    for name, kind in methods.METHODS.items():
-        default: Any = Command(methods.configure(kind, preset if name == chosen else None), Options(out=tyro.MISSING))
-        summary, generic = (kind.__doc__ or "").strip(), Command
-        kinds.append(Annotated[generic[kind], tyro.conf.subcommand(name, default=default, description=summary)])
-    kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
+    preset = _value_of("--preset", arguments) if chosen == APG.method else None
+    default: Any = Command(methods.configure(preset), Options(out=tyro.MISSING))
+    kinds: list[Any] = [Annotated[Repeat, tyro.conf.subcommand("repeat")]]
+    for name, kind in reversed(methods.METHODS.items()):
+        about = (inspect.getdoc(kind) or "").partition("\n\nRaises:")[0]
+        generic: Any = ByRewards
+        if kind is APG:
+            kinds.insert(0, Annotated[Command, tyro.conf.subcommand(name, default=default, description=about)])
+        else:
+            kinds.insert(0, Annotated[generic[kind], tyro.conf.subcommand(name, description=about)])
+            if chosen == name and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in arguments}:
+                raise InvalidInputError(f"{name} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command[Any] | Repeat = parse_options(
+    command: Command | ByRewards[Any] | Repeat = parse_options(
         any_of_them, arguments, prog=_program(), description=manual(), rules=RULES
     )
     return command
@@ -194,13 +220,23 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     return None
 
 
-def _train(command: Command[Any], text: str) -> int:
+def _train_by_rewards(command: ByRewards[Any]) -> int:
+    from baselines.training.rewards import Training  # imports PyTorch, an extra
+
+    for seed in _checked_seeds(command.seeds):
+        training = Training(command.config, seed, command.out / f"seed-{seed}")
+        there = training.finished()
+        about = there or training.run()
+        done = f"score {about['validation_score']:.3f} after {about['steps']} steps"
+        print(f"seed {seed}: {done}{', already there' if there else ''}", flush=True)
+    print(f"\nwritten to {command.out}")
+    return 0
+
+
+def _train(command: Command, text: str) -> int:
     options = command.options
-    seeds = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in options.seeds))
-    if not seeds:
-        raise TrainingError("seeds: expected at least one.")
     workers = Workers(options.workers, options.cluster)
-    results = train_seeds(command.config, options, seeds, workers=workers, command=text)
+    results = train_seeds(command.config, options, _checked_seeds(options.seeds), workers=workers, command=text)
     print(table(results))
     for result in results:
         if result.error:
@@ -210,12 +246,20 @@ def _train(command: Command[Any], text: str) -> int:
     return 2 if any(result.error for result in results) else 0
 
 
+def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
+    """The seeds without those given twice."""
+    checked = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in seeds))
+    if not checked:
+        raise TrainingError("seeds: expected at least one.")
+    return checked
+
+
 def _repeat(command: Repeat) -> int:
     about = read_run(command.run)
     wanted = about.get("weights_sha256")
     if not wanted:
         raise TrainingError(f"{command.run} belongs to a run that has not ended: finish it with --resume.")
-    config = methods.get(about["method"]).from_json(about["config"])
+    config = APG.from_json(about["config"])
     seed, text = whole_number("seed", about["seed"], at_least=0), [*_program().split(), "repeat", str(command.run)]
     (result,) = train_seeds(config, command, [seed], command=shlex.join(text))
     if result.error:

@@ -10,24 +10,24 @@ import baselines
 import ikgym
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.random_agents import network, random_agent
 
 SCENARIO = ikgym.scenarios.get("varga7-pose-random")
-KINDS = (Bilinear, Relative)
+KINDS = (Bilinear, Track)
 AGENTS = {
     "bilinear": random_agent(SCENARIO, processing=Bilinear((1, 5, 20))),
     "damped": random_agent(SCENARIO, processing=Bilinear((1, 5, 20), 1e-2)),
-    "relative": random_agent(SCENARIO, processing=Relative((2, 5), 5.0, 2.0, 0.5, "tanh"), training={"seed": 1}),
+    "track": random_agent(SCENARIO, processing=Track((0.002, 0.005), 0.5), training={"seed": 1}),
 }
 
 
 @pytest.fixture
 def file(tmp_path):
-    save_agent(tmp_path / "mine.safetensors", AGENTS["relative"])
+    save_agent(tmp_path / "mine.safetensors", AGENTS["track"])
     return tmp_path / "mine.safetensors"
 
 
@@ -52,12 +52,12 @@ def test_round_trip(agent, tmp_path):
 
 
 def test_other_agents_have_other_hashes():
-    processing = Relative((2, 5), 5.0)
+    processing = Track((0.002, 0.005))
     others = [
         random_agent(SCENARIO, processing=processing),
         random_agent(SCENARIO, processing=processing, seed=1),
         random_agent(SCENARIO, processing=processing, training={"seed": 2}),
-        random_agent(SCENARIO, processing=processing.replace(gain=2.0)),
+        random_agent(SCENARIO, processing=processing.replace(share=0.5)),
     ]
     assert len({agent.hash for agent in others}) == len(others)
 
@@ -93,11 +93,11 @@ def parts(file):
         (lambda t, a: a.pop("network"), "'network'"),
         *(
             (lambda t, a, x=x: a.update(processing=x), f"processing: expected a table, got {x!r}")
-            for x in (None, "relative", True)
+            for x in (None, "track", True)
         ),
-        (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or relative, got 'raw'"),
+        (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or track, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
-        (lambda t, a: a["processing"].update(offsets=[2, 1]), "rising steps ahead"),
+        (lambda t, a: a["processing"].update(ahead=[2, 1]), "rising times above 0"),
         (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "tensors: expected float32 of the shapes"),
         (lambda t, a: a.update(joints=6), "changed after it was written"),
@@ -120,12 +120,13 @@ def test_no_file(tmp_path):
 
 
 def test_processings_are_checked():
-    with pytest.raises(UnknownNameError, match="no squash 'cut'"):
-        Relative((1, 2), 5.0, squash="cut")
-    with pytest.raises(InvalidInputError, match="furthest"):
-        Relative((1, 2), 0.0)
+    with pytest.raises(InvalidInputError, match="share: expected"):
+        Track((0.1,), 0.0)
+    for ahead in ((), (0.0, 0.1), (0.2, 0.1), ("a",), 0.1):
+        with pytest.raises(InvalidInputError, match="ahead: expected"):
+            Track(ahead)
     with pytest.raises(InvalidInputError, match="offsets: expected at least two"):
-        Relative((1,), 5.0)
+        Bilinear((1,))
     with pytest.raises(InvalidInputError, match="damping: expected it together with predicted rates"):
         Bilinear.from_json({"damping": 1e-2})  # of a version that knew other joint rates
     with pytest.raises(UnknownNameError, match="no activation 'relo'"):

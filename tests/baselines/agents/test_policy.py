@@ -11,7 +11,7 @@ import ikgym
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import agent_of, save_agent
 from baselines.agents.policy import FOLDER, Agent, AgentAlone
-from baselines.agents.relative import Relative
+from baselines.agents.track import Track
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
@@ -19,7 +19,7 @@ from baselines.policy import Problem
 from baselines.spec import parse_policy
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
-from tests.baselines.random_agents import OFFSETS, network, random_agent, write_agent
+from tests.baselines.random_agents import AHEAD, OFFSETS, network, random_agent, write_agent
 from tests.comparison import identical
 
 STEPS = 6
@@ -28,8 +28,7 @@ RANDOM = ikgym.scenarios.get("varga7-random").replace(steps=STEPS)
 WHOLE = ikgym.scenarios.get("varga7-pose-random").replace(steps=STEPS)
 PANDA = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
 KINDS = {
-    "relative": Relative(OFFSETS, 5.0, 2.0),
-    "relative, tanh": Relative(OFFSETS, 5.0, 2.0, 0.7, "tanh"),
+    "track": Track(AHEAD),
     "bilinear": Bilinear(OFFSETS),
     "bilinear, damped": Bilinear(OFFSETS, 1e-2, interval=2),
 }
@@ -94,21 +93,6 @@ def test_the_network_is_evaluated_at_intervals(processing):
         assert [identical(*rows) for rows in zip(action, now, strict=True)] == list(wanted)
 
 
-def test_relative_agents_act_as_their_environment():
-    """Actions of the network in the environment for learning are those of the agent in the bare one."""
-    processing = Relative((2, 10, 30), 5.0, 2.0)
-    agent = random_agent(WHOLE, processing=processing)
-    policy = Agent(Problem.of(WHOLE), given=agent)
-    envs = ikgym.rl.make_vec(WHOLE, 3, preview=processing.offsets, furthest=5.0, largest=2.0, lost_distance=None)
-    plain = gym.make_vec("RedundantIK-v0", num_envs=3, scenario=WHOLE, preview=processing.offsets)
-    features, observation = envs.reset(seed=4)[0], plain.reset(seed=4)[0]
-    for _ in range(STEPS - 1):
-        features, *_, info = envs.step(agent.network.forward(features))
-        observation, *_, wanted = plain.step(policy.predict(observation)[0])
-        np.testing.assert_allclose(info["tracking_cost"], wanted["tracking_cost"], rtol=1e-5)
-        np.testing.assert_allclose(info["velocity_cost"], wanted["velocity_cost"], rtol=1e-5)
-
-
 def test_previews():
     policy = agent_on(RANDOM)
     assert policy.preview == OFFSETS
@@ -131,7 +115,7 @@ def test_scenarios_that_do_not_fit(tmp_path, file):
     with pytest.raises(InvalidInputError, match="moves differently"):
         baselines.make("agent", other, path=whole)
     assert rollout(other, baselines.make("agent", other, path=whole, any_arm=True), 0)
-    save_agent(tmp_path / "a.safetensors", agent_of(network((5, 7)), Relative(OFFSETS, 5.0), FAST))
+    save_agent(tmp_path / "a.safetensors", agent_of(network((5, 7)), Track(AHEAD), FAST))
     with pytest.raises(InvalidInputError, match=r"from \d+ features to 7 outputs, got 5 and 7"):
         baselines.make("agent", FAST, path=str(tmp_path / "a.safetensors"))
 

@@ -79,10 +79,11 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
         (
             ["train", "pop", "--out", "x"],
-            "no method 'pop'. Did you mean 'ppo'? Available: ppo, sac, td3, apg,",
+            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3,",
         ),
-        (["train", "--out", "x"], "expected a method, one of ppo, sac, td3, apg, or repeat; got --out."),
-        (["train", "ppo"], "Missing from ikgym train ppo: --out."),
+        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, or repeat; got --out."),
+        (["train", "ppo", "--env", "ikgym/Track-v0"], "Missing from ikgym train ppo: --out."),
+        (["train", "ppo", "--out", "x"], "ppo needs an environment: expected --env, one of ikgym/Reach-v0, ikgym/T"),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
         (["arms", "none.urdf"], "Cannot read none.urdf"),
         (["scenarios", "none.toml"], "Cannot read none.toml"),
@@ -97,10 +98,9 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["compare", "panda", "none.csv", "--speed", "1"], "Cannot read none.csv"),
         (["compare", "pandas", "none.csv", "--speed", "1"], "There is no arm 'pandas'. Did you mean 'panda'?"),
         (["compare", "panda-line", "--tip", "hand"], "--tip has no effect without a CSV file."),
-        (["train", "ppo", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
+        (["train", "apg", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
         (["train", "apg", "--preset", "smoke", "--preset", "quick", "--out", "x"], "--preset is given twice"),
         (["train", "apg", "--out", "x", "--checkpoint-every", "nan"], "checkpoint_every: expected a finite number"),
-        (["train", "ppo", "--out", "x", "--set", "gamma=0", "gamma=1"], "set: gamma is given twice."),
         (["evaluate", "--episodes", HUGE], f"episodes: {SIZE}, got {HUGE}."),
         (["reproduce", "--out", ""], "--out: expected a value, got an empty text."),
         (["--version", "now"], "--version: expected nothing after it, got now."),
@@ -257,7 +257,7 @@ def test_training_without_its_extra_says_which(tmp_path):
     (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('no', name='torch')\n")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
     done = subprocess.run(
-        [sys.executable, str(ROOT / "train.py"), "ppo", "--out", str(tmp_path)],
+        [sys.executable, str(ROOT / "train.py"), "ppo", "--env", "ikgym/Track-v0", "--out", str(tmp_path)],
         env=environment,
         capture_output=True,
         text=True,

@@ -4,41 +4,36 @@ import json
 import pathlib
 from typing import Any
 
-from baselines.training import methods
-from baselines.training.config import Config
-from baselines.training.methods import new_trainer
+from baselines.training.config import APG
 from baselines.training.randomness import reseed
-from baselines.training.trainers.base import Trainer
+from baselines.training.trainer import Trainer
 
-#: Options that make a run of a method short.
-SHORT: dict[str, dict[str, Any]] = {"segments": 3, "evaluate_every": 2, "validation_episodes": 2, "n_envs": 4}
-LEARNING: dict[str, Any] = {"scenario": "varga7-random", "steps": 20, "total_timesteps": 240}
-TINY: dict[str, dict[str, Any]] = {
-    "apg": {
-        "scenario": "varga7-random",
-        "task": "pose",
-        "steps": 100,
-        "hidden": (8, 8),
-        "offsets": (1, 2, 10),
-        "hold": 8,
-        "segment_steps": 48,
-        "window": (16, 48),
-    },
-    "ppo": {**LEARNING, "settings": ("n_steps=10", "batch_size=20")},
-    "sac": {**LEARNING, "settings": ("learning_starts=40", "buffer_size=200")},
-    "td3": {**LEARNING, "settings": ("learning_starts=40", "action_noise=0.1")},
+#: Options that make a run short.
+TINY: dict[str, Any] = {
+    "scenario": "varga7-random",
+    "task": "pose",
+    "steps": 100,
+    "segments": 3,
+    "evaluate_every": 2,
+    "validation_episodes": 2,
+    "n_envs": 4,
+    "hidden": (8, 8),
+    "offsets": (1, 2, 10),
+    "hold": 8,
+    "segment_steps": 48,
+    "window": (16, 48),
 }
 
 
-def tiny(method: str, **changes: Any) -> Config:
+def tiny(**changes: Any) -> APG:
     """A configuration that is trained within a second or two."""
-    return methods.get(method)(**{**SHORT, **TINY[method], **changes})
+    return APG(**{**TINY, **changes})
 
 
-def trainer_of(config: Config, seed: int = 1) -> Trainer:
+def trainer_of(config: APG, seed: int = 1) -> Trainer:
     """The trainer of a configuration, before its first segment."""
     reseed(seed, None)
-    return new_trainer(config, config.make_scenario(), seed)
+    return Trainer(config, config.make_scenario(), seed)
 
 
 def play_segments(trainer: Trainer, numbers: Any, seed: int = 1) -> list[dict[str, float]]:

@@ -15,7 +15,7 @@ from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.small import play_segments, tiny, trainer_of
 
-CONFIG = tiny("apg")
+CONFIG = tiny()
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from baselines.training.folder import FORMAT
 
 def run(folder, seed, costs):
     scores = [{"core_minutes": 0.5 * i, "cost": cost} for i, cost in enumerate(costs)]
-    about = {"format": FORMAT, "method": "ppo", "seed": seed, "config": {}, "validation": scores}
+    about = {"format": FORMAT, "method": "apg", "seed": seed, "config": {}, "validation": scores}
     (folder / f"seed-{seed}").mkdir(parents=True)
     (folder / f"seed-{seed}" / "run.json").write_text(json.dumps(about), encoding="utf-8")
 

@@ -14,7 +14,7 @@ from baselines.training.folder import FORMAT, MAGIC
 from baselines.training.run import train
 from tests.baselines.training.small import about, timeless, tiny
 
-CONFIG = tiny("apg")
+CONFIG = tiny()
 
 
 @pytest.fixture(scope="module")
@@ -137,4 +137,4 @@ def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
 
 def test_weights_that_diverge(tmp_path):
     with pytest.raises(TrainingError, match="The weights diverged in segment"):
-        train(tiny("ppo", settings=("n_steps=10", "batch_size=20", "learning_rate=1e12")), 3, tmp_path)
+        train(CONFIG.replace(learning_rate=1e12, learning_rate_end=1e12), 3, tmp_path)

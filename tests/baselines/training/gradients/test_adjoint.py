@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from baselines.agents.bilinear.features import mean_twists
 from baselines.agents.bilinear.kernels import action_rows
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym import TrackingCost, arms, scenarios, tasks
-from ikgym.rl.feature_kernels import mean_twists
 from ikgym.rl.twists import twist_size
 from ikgym.simulator import Simulator
 from tests.comparison import identical

@@ -19,17 +19,27 @@ from baselines.training.exporting import ACTIVATIONS, runtime
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from baselines.training.randomness import sequence
-from baselines.training.trainers.base import ActorTrainer, SegmentMetrics
 from ikgym.scenarios import Scenario
 
+#: Metrics of a segment by name.
+SegmentMetrics = dict[str, float]
 #: Factor of the first weights of the last layer.
 QUIET = 0.01
 #: Norm at which gradients with respect to joint coordinates are clipped: longer ones have overflowed.
 OVERFLOW = 1e30
 
 
-class APGTrainer(ActorTrainer):
-    """See :class:`APG`. `policy` is the average of the actor, whose weights Adam changes.
+class Trainer:
+    """See :class:`APG`: a training that proceeds segment by segment.
+
+    Before it is made and before each segment, :func:`baselines.training.randomness.reseed` seeds the generators of
+    Python, NumPy and PyTorch; all other randomness comes from :func:`baselines.training.randomness.sequence`. A segment
+    depends on nothing but :meth:`state` and its number: a run that was killed and resumed from any earlier state ends
+    with the same weights, bit for bit.
+
+    Attributes:
+        policy: The network that is evaluated and kept: the average of the actor, whose weights Adam changes.
+        steps: Steps of the environment so far, summed over all arms.
 
     Args:
         config: The options of the method.
@@ -41,15 +51,14 @@ class APGTrainer(ActorTrainer):
         TrainingError: The agent of `init` has another structure.
     """
 
-    _config: APG
-    policy: nn.Sequential
-
     def __init__(self, config: APG, scenario: Scenario, seed: int) -> None:
         self._law = Law(scenario, config.processing)
         policy = new_actor((self._law.inputs, *config.hidden, self._law.outputs), config.activation)
         if config.init is not None:
             _load_weights(policy, config)
-        super().__init__(config, scenario, seed, policy, copy.deepcopy(policy))
+        self._config, self._scenario, self._seed = config, scenario, seed
+        self.policy, self._actor, self.steps = policy, copy.deepcopy(policy), 0
+        self._adam = torch.optim.Adam(self._actor.parameters(), lr=config.learning_rate)
         self._updates = 0
         self._arms = Arms(scenario, config.n_envs, config.offsets, config.hold)
         self._farthest = config.reset_distance
@@ -57,9 +66,10 @@ class APGTrainer(ActorTrainer):
         self._far = np.zeros(config.n_envs)
 
     def segment(self, number: int) -> SegmentMetrics:
-        """See :meth:`Trainer.segment`."""
+        """Trains for one segment, counted from 0."""
         config, generator = self._config, np.random.default_rng(sequence(self._seed, number))
-        self._set_learning_rate(number)
+        for group in self._adam.param_groups:
+            group["lr"] = config.learning_rate_of(number)
         losses, refused, lost = [], 0, 0
         window, self._farthest = config.window_of(number), config.reset_distance_of(number)
         for _ in range(config.segment_steps // window):
@@ -72,19 +82,22 @@ class APGTrainer(ActorTrainer):
         return {"train/loss": float(np.median(losses)), "train/refused": float(refused), "train/lost": float(lost)}
 
     def agent(self, training: dict[str, Any] | None = None) -> AgentFile:
-        """See :meth:`Trainer.agent`."""
+        """The agent with the present weights of `policy`; `training` says how it was trained, as JSON values."""
         network = runtime(list(self.policy), "linear")
         return agent_of(network, self._config.processing, self._scenario, training)
 
     def state(self) -> dict[str, Any]:
-        """See :meth:`Trainer.state`."""
-        actor, far = copy.deepcopy(self._actor.state_dict()), torch.from_numpy(self._far.copy())
-        own = {"actor": actor, "updates": self._updates, "far": far}
-        return {**super().state(), **own, "arms": self._arms.state()}
+        """All that later segments depend on: tensors, numbers, strings, and lists and dicts of them."""
+        parts: dict[str, Any] = {"policy": self.policy, "adam": self._adam, "actor": self._actor}
+        weights = {name: copy.deepcopy(part.state_dict()) for name, part in parts.items()}
+        own = {"steps": self.steps, "updates": self._updates, "far": torch.from_numpy(self._far.copy())}
+        return {**weights, **own, "arms": self._arms.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """See :meth:`Trainer.restore`."""
-        super().restore(state)
+        """Continues from a :meth:`state` of this process or another."""
+        self.policy.load_state_dict(state["policy"])
+        self._adam.load_state_dict(copy.deepcopy(state["adam"]))
+        self.steps = state["steps"]
         self._actor.load_state_dict(state["actor"])
         self._updates, self._far = state["updates"], state["far"].numpy().copy()
         self._arms.restore(state["arms"])
@@ -137,6 +150,16 @@ class APGTrainer(ActorTrainer):
         """Which arms are too far from their references. Shape (N,)."""
         lost: npt.NDArray[np.bool_] = self._far > self._farthest
         return lost
+
+    def _descend(self, loss: Tensor) -> bool:
+        """One step of Adam; False, and no step, if the gradient is not finite."""
+        self._adam.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        size = nn.utils.clip_grad_norm_(self._actor.parameters(), self._config.max_grad_norm)
+        finite = bool(torch.isfinite(size))
+        if finite:
+            self._adam.step()
+        return finite
 
     def _average(self) -> None:
         """Moves the average towards the actor, faster at first."""

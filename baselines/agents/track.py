@@ -1,0 +1,82 @@
+"""Agents trained in the environments of :mod:`ikgym.rl`: the same features, and actions of the same meaning."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from baselines.agents.network import Network
+from baselines.agents.processing import Held, Processing
+from baselines.policy import Batch, Problem
+from ikgym.rl.track import middle, steps_ahead
+from ikgym.rl.track_kernels import track_rows
+from ikgym.rl.twists import twist_size
+from ikgym.validation import FloatArray, number
+
+
+@dataclasses.dataclass(frozen=True)
+class Track(Processing):
+    """Joint velocities as a share of the largest, from the features of :class:`ikgym.rl.TrackObservation`.
+
+    Times ahead are in [s], so that an agent trained at 100 Hz sees as far at 1 kHz.
+
+    Args:
+        ahead: Times ahead at which the reference is seen, in [s], rising.
+        share: Share of the largest joint velocities that an output of 1 means, above 0.
+        radian: Weight of 1 rad in [m], above 0.
+        zero: Coarse unit of errors in [m], above 0.
+        fine: Fine unit of errors in [m], above 0.
+
+    Raises:
+        InvalidInputError: A value is out of its range.
+    """
+
+    ahead: tuple[float, ...]
+    share: float = 1.0
+    radian: float = 0.3
+    zero: float = 0.1
+    fine: float = 0.01
+
+    kind: ClassVar[str] = "track"
+    #: Steps for which an action was held in the training.
+    interval = 1
+    #: Actions are those of the model; the limits of the arm hold on top.
+    bounded: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        steps_ahead(self.ahead, 1.0)
+        numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("share", "radian", "zero", "fine")}
+        for field, value in {"ahead": tuple(map(float, self.ahead)), **numbers}.items():
+            object.__setattr__(self, field, value)
+
+    def steps(self, problem: Problem) -> tuple[int, ...]:
+        """See :meth:`Processing.steps`."""
+        return steps_ahead(self.ahead, problem.dt)
+
+    def size(self, problem: Problem) -> int:
+        """The number of features."""
+        return 2 * (problem.model.joints + len(self.steps(problem)) * int(twist_size(problem.task.kind)))
+
+    def outputs(self, problem: Problem) -> int:
+        """The number of network outputs: one a joint."""
+        return problem.model.joints
+
+    def held(self, problem: Problem) -> int:
+        """The number of values that are held between evaluations of the network: its outputs."""
+        return problem.model.joints
+
+    def act(self, problem: Problem, batch: Batch, network: Network, interval: int, held: Held) -> FloatArray:
+        """See :meth:`Processing.act`."""
+        features, due, largest = np.empty((len(batch.q), self.size(problem))), held.left == 0, problem.largest_qdot
+        seen = batch.q, batch.qdot, batch.pose, batch.nominal
+        scales = self.radian, self.zero, self.fine
+        arm = problem.task.kind, problem.model.chain, scales, *middle(problem.model), largest
+        track_rows(*arm, *seen, features)
+        if due.any():
+            held.values[due] = network.forward(features[due].astype(np.float32))
+            held.left[due] = interval
+        held.left[:] -= 1
+        fractions: FloatArray = held.values * (self.share * largest / problem.velocity_limit)
+        return fractions

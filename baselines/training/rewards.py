@@ -1,0 +1,200 @@
+"""Stable-Baselines3 in the environments by id, with settings in the format of rl-zoo3: thin calls, nothing changed."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import dataclasses
+import functools
+import math
+import operator
+import pathlib
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+import yaml
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.noise import NormalActionNoise
+
+import ikgym.sb3
+from baselines.files import resumed, write_json
+from baselines.training.config import Rewards
+from baselines.training.exporting import ACTIVATIONS, export
+from ikgym import rl
+from ikgym.exceptions import InvalidInputError
+from ikgym.files import read_user_file
+from ikgym.validation import FloatArray, known_name, whole_number
+
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
+#: A file an algorithm, with an entry an environment.
+SETTINGS = pathlib.Path(__file__).parent / "settings"
+#: Settings that may change during a training: ``lin_0.001`` falls linearly from there to 0.
+SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf", "delta_std")
+
+
+@dataclasses.dataclass(frozen=True)
+class Training:
+    """One training run.
+
+    Args:
+        config: Its options.
+        seed: Of the run.
+        out: Its folder.
+    """
+
+    config: Rewards
+    seed: int
+    out: pathlib.Path
+
+    def finished(self) -> dict[str, Any] | None:
+        """The `run.json` in the folder, if the same run has ended there.
+
+        Raises:
+            ResultsError: Another run has.
+        """
+        return resumed(self.out / "run.json", self._identity(), resume=True, overwrite=False)
+
+    def run(self) -> dict[str, Any]:
+        """Trains, and writes `model.zip`, `agent.safetensors`, `curve.csv` and in the end `run.json`.
+
+        Returns:
+            The content of `run.json`.
+
+        Raises:
+            UnknownNameError: The settings have no entry for the environment.
+            InvalidInputError: The settings cannot be read, or the algorithm refuses one.
+            ResultsError: A file cannot be written.
+        """
+        torch.set_num_threads(1)
+        about = self._identity()
+        settings = about["settings"]
+        model = make(self.config, settings, self.seed)
+        self.out.mkdir(parents=True, exist_ok=True)
+        curve = Curve(self.config, settings["n_timesteps"], self.out / "curve.csv")
+        model.learn(settings["n_timesteps"], callback=curve)
+        model.save(self.out / "model.zip")
+        about |= {"steps": model.num_timesteps, "core_seconds": round(curve.spent, 1)}
+        about |= {"validation_score": curve.validate()}
+        about["agent"] = self._export(model, about)
+        write_json(self.out / "run.json", about)
+        return about
+
+    def _identity(self) -> dict[str, Any]:
+        """What the result depends on, for `run.json`."""
+        config, settings = self.config, read(self.config)
+        settings["n_timesteps"] = int(config.total_timesteps or settings["n_timesteps"])
+        named = {"env": config.env, "algorithm": config.method, "seed": self.seed}
+        return {**named, "settings": settings, "minutes": config.minutes}
+
+    def _export(self, model: BaseAlgorithm, about: dict[str, Any]) -> str:
+        """Writes `agent.safetensors`, and returns its hash, or why there is none."""
+        envs: Any = model.get_env()
+        try:
+            return export(model, envs, self.out / "agent.safetensors", about)
+        except InvalidInputError as e:
+            return f"none: {e}"
+
+
+def read(config: Rewards) -> dict[str, Any]:
+    """The settings of algorithm and environment, as the file has them.
+
+    Raises:
+        UnknownNameError: The file has no entry for the environment.
+        InvalidInputError: The file cannot be read.
+    """
+    if config.defaults:
+        return {"n_timesteps": 1_000_000}
+    file = SETTINGS / f"{config.method}.yml" if config.settings is None else config.settings
+    try:
+        content = yaml.safe_load(read_user_file(file))
+    except yaml.YAMLError as e:
+        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {e}") from e
+    known_name("environment in the settings", config.env, content if isinstance(content, dict) else {})
+    found = content[config.env]
+    if not isinstance(found, dict) or not isinstance(found.get("n_timesteps"), (int, float)):
+        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {found!r}.")
+    return dict(found)
+
+
+def make(config: Rewards, settings: Mapping[str, Any], seed: int = 0) -> BaseAlgorithm:
+    """The model that rl-zoo3 makes of the same settings and seed.
+
+    Raises:
+        InvalidInputError: The algorithm refuses a setting.
+    """
+    parameters = {key: _value(key, value) for key, value in settings.items() if key != "n_timesteps"}
+    envs = ikgym.sb3.make_vec(config.env, whole_number("n_envs", parameters.pop("n_envs", 1), at_least=1))
+    if parameters.pop("noise_type", None) is not None:
+        joints: FloatArray = np.ones(envs.scenario.joints)
+        parameters["action_noise"] = NormalActionNoise(0.0 * joints, parameters.pop("noise_std") * joints)
+    policy, kind = parameters.pop("policy", "MlpPolicy"), ALGORITHMS[config.method]
+    try:
+        return kind(policy, envs, seed=seed, device="cpu", **parameters)
+    except (AssertionError, TypeError, ValueError) as e:  # Stable-Baselines3's own checks
+        raise InvalidInputError(f"settings: {config.method} refuses {parameters}: {e}") from e
+
+
+class Curve(BaseCallback):
+    """Validates at intervals, writes a row each time, and stops when the time is over.
+
+    Args:
+        config: The options of the run.
+        steps: Its steps.
+        file: Receives the rows: CPU seconds, steps and score.
+    """
+
+    def __init__(self, config: Rewards, steps: int, file: pathlib.Path) -> None:
+        super().__init__()
+        self._config, self._file, self._rows = config, file, [("core_seconds", "steps", "score")]
+        self._steps, self._seconds = steps, 60.0 * (config.minutes or math.inf)
+        self.spent, self._since = 0.0, time.process_time()
+
+    def _on_step(self) -> bool:
+        now = time.process_time()
+        self.spent, self._since = self.spent + now - self._since, now
+        done = max(self.spent / self._seconds, self.num_timesteps / self._steps)
+        if done * self._config.validations >= len(self._rows):
+            self.validate()
+        return self.spent < self._seconds
+
+    def validate(self) -> float:
+        """The present score on episodes of the split `validation`, which is written to the file."""
+        env, episodes = self._config.env, self._config.episodes
+        score = rl.score({env: [rl.costs(self.model, env, episodes=episodes)]}, "validation")[env].mean
+        self._rows.append((f"{self.spent:.1f}", str(self.num_timesteps), f"{score:.4f}"))
+        with self._file.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream).writerows(self._rows)
+        self._since = time.process_time()
+        return score
+
+
+def _value(key: str, value: Any) -> Any:
+    """A value as rl-zoo3 reads it: ``lin_…`` is a schedule, and Python's ``dict(…)`` as text is a mapping.
+
+    Raises:
+        InvalidInputError: The text is neither.
+    """
+    if not isinstance(value, str):
+        return value
+    try:
+        if key in SCHEDULED:
+            return functools.partial(operator.mul, float(value.split("lin_")[1]))  # of the share that remains
+        if value.startswith("dict("):
+            call: Any = ast.parse(value, mode="eval").body
+            return {one.arg: _literal(one.value) for one in call.keywords}
+    except (IndexError, SyntaxError, ValueError) as e:
+        raise InvalidInputError(f"settings: expected {key} in the format of rl-zoo3, got {value!r}: {e}") from e
+    return value
+
+
+def _literal(node: ast.expr) -> Any:
+    """A literal, or an activation such as ``nn.ReLU``."""
+    if isinstance(node, ast.Attribute):
+        known_name("activation", node.attr, kinds := {kind.__name__: kind for kind in ACTIVATIONS.values()})
+        return kinds[node.attr]
+    return ast.literal_eval(node)

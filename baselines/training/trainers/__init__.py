@@ -1,1 +1,0 @@
-"""One trainer a method of learning."""

@@ -1,0 +1,164 @@
+"""Training of Stable-Baselines3 in the environments by id, with settings in the format of rl-zoo3."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.noise import NormalActionNoise
+
+import baselines
+from baselines.cli.commands.train import main
+from baselines.training.methods import METHODS
+from baselines.training.rewards import ALGORITHMS, Training, make, read
+from ikgym.exceptions import IkgymError
+from ikgym.rl import IDS
+
+TRACK = "ikgym/Track-v0"
+NET = "dict(net_arch=[8, 8])"
+SMALL = {
+    "ppo": f'{{n_envs: 2, n_timesteps: 64, policy: MlpPolicy, n_steps: 16, batch_size: 16, policy_kwargs: "{NET}"}}',
+    "sac": f'{{n_envs: 2, n_timesteps: 64, learning_starts: 20, batch_size: 8, policy_kwargs: "{NET}"}}',
+    "td3": '{n_envs: 2, n_timesteps: 64, learning_starts: 20, batch_size: 8, noise_type: normal, noise_std: 0.1, '
+    "policy_kwargs: {net_arch: [8, 8]}}",
+}  # fmt: skip
+
+
+@pytest.fixture
+def settings(tmp_path, request):
+    file = tmp_path / "small.yml"
+    file.write_text(f"{TRACK}: {SMALL[request.param]}\n", encoding="utf-8")
+    return file
+
+
+def options(algorithm, **changes):
+    return METHODS[algorithm](**{"env": TRACK, "validations": 1, "episodes": 2, **changes})
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
+    small = {} if algorithm == "ppo" else {"n_envs": 1, "buffer_size": 10}
+    for env in IDS:
+        config = options(algorithm, env=env)
+        found = read(config)
+        assert found["n_timesteps"] > 0
+        assert make(config, {**found, **small}).gamma == found["gamma"]
+
+
+def test_settings_are_read_as_rl_zoo3_reads_them():
+    kwargs = "dict(net_arch=[8, 8], activation_fn=nn.ReLU, log_std_init=-1.5)"
+    settings = {"n_steps": 8, "batch_size": 8, "learning_rate": "lin_0.004", "clip_range": "lin_0.2"}
+    model = make(options("ppo"), {**settings, "policy_kwargs": kwargs})
+    assert model.policy_kwargs == {"net_arch": [8, 8], "activation_fn": torch.nn.ReLU, "log_std_init": -1.5}
+    assert [model.lr_schedule(left) for left in (1.0, 0.25, 0.0)] == [0.004, 0.001, 0.0]
+    assert model.clip_range(0.5) == 0.1
+
+
+def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
+    file = tmp_path / "long.yml"
+    entry = "{n_timesteps: 10000000, n_steps: 16, batch_size: 16, learning_rate: lin_0.001}"
+    file.write_text(f"{TRACK}: {entry}\n", encoding="utf-8")
+    about = Training(options("ppo", minutes=0.02, settings=file), 0, tmp_path / "run").run()
+    assert 0 < about["steps"] < 10_000_000
+    rate = PPO.load(tmp_path / "run" / "model.zip").policy.optimizer.param_groups[0]["lr"]
+    assert 0.0009 < rate <= 0.001
+
+
+@pytest.mark.parametrize("setting", [
+    {"learning_rate": "1e-3"}, {"learning_rate": "lin_fast"}, {"policy_kwargs": "dict(activation_fn=nn.Swish)"},
+    {"policy_kwargs": "dict(activation_fn=eval('1'))"}, {"policy_kwargs": "dict(net_arch="},
+])  # fmt: skip
+def test_other_texts_are_refused(setting):
+    with pytest.raises(IkgymError, match=r"settings: expected|There is no activation|Unknown activation"):
+        make(options("ppo"), {"n_steps": 8, "batch_size": 8, **setting})
+
+
+@pytest.mark.parametrize(("settings", "algorithm"), [(one, one) for one in SMALL], indirect=["settings"])
+def test_the_first_updates_are_those_of_plain_calls(settings, algorithm, tmp_path):
+    Training(options(algorithm, settings=settings), 3, tmp_path / "run").run()
+    kind = {"ppo": PPO, "sac": SAC, "td3": TD3}[algorithm]
+    plain = {
+        "ppo": {"n_steps": 16, "batch_size": 16},
+        "sac": {"learning_starts": 20, "batch_size": 8},
+        "td3": {
+            "learning_starts": 20,
+            "batch_size": 8,
+            "action_noise": NormalActionNoise(np.zeros(7), np.full(7, 0.1)),
+        },
+    }[algorithm]
+    envs = make_vec_env(TRACK, 2, seed=3)  # as rl-zoo3 makes them
+    theirs = kind("MlpPolicy", envs, seed=3, device="cpu", policy_kwargs={"net_arch": [8, 8]}, **plain)
+    before = {name: value.clone() for name, value in theirs.policy.state_dict().items()}
+    theirs.learn(64)
+    ours = kind.load(tmp_path / "run" / "model.zip", device="cpu")
+    changed = 0
+    for name, value in theirs.policy.state_dict().items():
+        assert torch.equal(value, ours.policy.state_dict()[name])
+        changed += not torch.equal(value, before[name])
+    assert changed > 0
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_the_command_writes_model_agent_curve_and_score_and_goes_on_where_it_was_stopped(settings, tmp_path, capsys):
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--validations", "2", "--episodes", "2"]
+    words += ["--out", str(tmp_path / "runs"), "--seeds"]
+    assert main([*words, "1"]) == 0
+    assert main([*words, "1", "2"]) == 0
+    one, *_, again, two, _, _ = capsys.readouterr().out.splitlines()
+    assert again == f"{one}, already there"
+    assert two.startswith("seed 2: score ")
+    assert not two.endswith("there")
+    for seed in (1, 2):
+        folder = tmp_path / "runs" / f"seed-{seed}"
+        about = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        rows = list(csv.DictReader((folder / "curve.csv").read_text(encoding="utf-8").splitlines()))
+        assert about["steps"] == int(rows[-1]["steps"]) == 64
+        assert float(rows[-1]["score"]) == pytest.approx(about["validation_score"], abs=1e-4)
+        assert (folder / "model.zip").is_file()
+        policy = baselines.make("agent", "learning-track", path=folder / "agent.safetensors")
+        assert policy.hash == about["agent"][:12]
+    assert main([*words, "1", "--total-timesteps", "32"]) == 2
+    assert "run.json differs in settings" in capsys.readouterr().err
+
+
+def test_environments_with_a_history_have_no_agent_and_say_why(tmp_path):
+    file, env = tmp_path / "small.yml", "ikgym/Payload-v0"
+    file.write_text(f"{env}: {SMALL['ppo']}\n", encoding="utf-8")
+    about = Training(options("ppo", env=env, settings=file), 0, tmp_path / "run").run()
+    assert about["agent"].startswith("none: model: expected a network from 38 features to 7 outputs, got 272")
+    assert not (tmp_path / "run" / "agent.safetensors").exists()
+
+
+@pytest.mark.parametrize("settings", ["td3"], indirect=True)
+@pytest.mark.parametrize(("words", "message"), [
+    (["ppo", "--env", "ikgym/Trak-v0"], "ikgym/Track-v0"),
+    (["pp", "--env", TRACK], "Did you mean 'ppo'"),
+    (["ppo"], "expected --env, one of ikgym/Reach-v0, ikgym/Track-v0,"),
+    (["ppo", "--env", "ikgym/Fast-v0", "--settings", "FILE"], "ikgym/Track-v0"),
+    (["ppo", "--env", TRACK, "--settings", "FILE"], "ppo refuses"),
+    (["ppo", "--env", TRACK, "--settings", "FILE", "--defaults"], "no effect with --defaults"),
+    (["ppo", "--env", TRACK, "--settings", "missing.yml"], "Cannot read missing.yml"),
+    (["ppo", "--env", TRACK, "--minutes", "0"], "minutes: expected a finite number above 0"),
+    (["ppo", "--env", TRACK, "--episodes", "0"], "episodes: expected a whole number of at least 1"),
+])  # fmt: skip
+def test_mistakes_are_named(words, message, settings, tmp_path, capsys):
+    words = [str(settings) if word == "FILE" else word for word in words]
+    assert main([*words, "--out", str(tmp_path / "runs")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("content", "message"), [
+    ("[", "expected a YAML file"), ("1", "environment in the settings"), (f"{TRACK}: 3", "expected n_timesteps"),
+    (f"{TRACK}: {{gamma: 0.9}}", "expected n_timesteps"),
+])  # fmt: skip
+def test_other_files_of_settings_are_refused(content, message, tmp_path):
+    (tmp_path / "mine.yml").write_text(content, encoding="utf-8")
+    with pytest.raises(IkgymError, match=message):
+        read(options("ppo", settings=tmp_path / "mine.yml"))
