@@ -26,6 +26,8 @@ from ikgym.rl import Task
 from ikgym.validation import BoolArray, FloatArray
 
 RESULTS, RUNS = Path(__file__).parent / "results" / "contexts.csv", Path("runs")
+#: What was measured lies here until the end.
+WORK = Path("results") / "measure"
 #: Scenario and seeds of each split, and its episodes.
 SPLITS = {
     "train": ("learning-context", "train"),
@@ -118,7 +120,8 @@ def _solver(name: str) -> Played:
     """A policy on the first episodes of each split."""
     out = {}
     for split, (scenario, seeds) in SPLITS.items():
-        rows = evaluate(scenario, [POLICIES[name]], split=seeds, episodes=EPISODES, progress=True)
+        kept: dict[str, Any] = {"out": WORK / f"contexts-{split}-{name}", "resume": True, "report": False}
+        rows = evaluate(scenario, [POLICIES[name]], split=seeds, episodes=EPISODES, progress=True, **kept)
         out[split] = np.array([[row.total_cost for row in rows]]), np.array([[row.lost for row in rows]])
     return out
 

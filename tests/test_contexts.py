@@ -41,6 +41,7 @@ def test_a_learner_is_scored_as_a_policy_is():
 def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     """Those without a model keep their line."""
     monkeypatch.setattr(contexts, "RUNS", tmp_path)
+    monkeypatch.setattr(contexts, "WORK", tmp_path / "measure")
     monkeypatch.setattr(contexts, "EPISODES", 2)
     monkeypatch.setattr(contexts, "RESULTS", tmp_path / "contexts.csv")
     contexts.train("ppo_shown", 0, 0.001)
