@@ -35,6 +35,7 @@ from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write
 from baselines.oracle import best_known
 from baselines.training.config import Rewards
+from docs import contexts
 
 RESULTS = Path(__file__).parent / "results"
 #: What was measured lies here until the end, and agents are found here.
@@ -69,7 +70,7 @@ class Command:
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, agents_panda,
-    plants."""
+    plants and contexts."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -237,7 +238,7 @@ def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        own = {"agents_interval": intervals, "periods": periods, "plants": plants}
+        own = {"agents_interval": intervals, "contexts": contexts.measured, "periods": periods, "plants": plants}
         make = own.get(name, functools.partial(measured, name))
         new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())

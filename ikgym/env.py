@@ -18,6 +18,7 @@ from ikgym.options import checked_distance, checked_options
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
+from ikgym.validation import FloatArray
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -94,7 +95,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `at_limit` | joints held back by a stop, by the velocity limit, by the acceleration limit; int64 (3,) | 1 |
     | `time` | time since the start | [s] |
 
-    After a reset `info` is empty.
+    After a reset `info` is empty, but for `context`, float64 (c,), where the plant draws numbers from ranges, see
+    :class:`ikgym.Plant`: -1 at the lower end of a range, 1 at the upper end. No policy of the benchmark sees it.
 
     ## Starting state
     The scenario's start, with no velocity. `reset(seed=…)` chooses the trajectory of a random scenario, and all random
@@ -163,6 +165,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         return self._simulator.preview
 
     @property
+    def context(self) -> FloatArray:
+        """What the plant of the episode has drawn from ranges, see :class:`ikgym.plant.DrawnPlant`. Shape (c,)."""
+        context: FloatArray = self._simulator.context[0].copy()
+        return context
+
+    @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make() sets
         """The specification, with the steps of an episode; None without `gym.make`."""
         return self._spec
@@ -183,7 +191,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 steps, on its reference joint path.
 
         Returns:
-            The first observation, and an empty info.
+            The first observation, and an info that is empty or has the context.
 
         Raises:
             UnknownNameError: There is no such option.
@@ -200,7 +208,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         out = self._simulator.observe()
         if self._pictures is not None:
             self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
-        return observation(out, 0), {}
+        return observation(out, 0), {"context": self.context} if self.context.size else {}
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; see the class for the returned values.

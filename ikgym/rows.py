@@ -12,7 +12,7 @@ from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import NoAttributeError
 from ikgym.kernels.outcome import Observation, Outcome
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray
+from ikgym.validation import BoolArray, FloatArray
 
 #: Keys of numbers, in the order of an outcome, from the tracking cost on.
 NUMBERS = ("tracking_cost", "velocity_cost", "position_error", "orientation_error")
@@ -30,6 +30,13 @@ _SHARED: dict[str, Callable[[Any, int], Any]] = {
     "np_random_seed": lambda envs, row: envs.generator(row)[1],
 }
 _OWN = ("_envs", "_index")
+
+
+class Hinting(type):
+    """Adds a hint to the class name, which is all that Stable-Baselines3 shows of an environment that it refuses."""
+
+    def __repr__(cls) -> str:
+        return f"{super().__repr__()[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
 
 
 class ArmRow:
@@ -59,6 +66,16 @@ class ArmRow:
         if name in _SHARED or name in _OWN:
             raise NoAttributeError(f"{name!r} of one arm cannot be set: make another environment.")
         self.__dict__[name] = value
+
+
+def contexts(context: FloatArray, rows: BoolArray) -> Infos:
+    """Infos of some rows whose episodes have begun; zero in the others.
+
+    Args:
+        context: Of all rows. Shape (N, c).
+        rows: Which rows. Shape (N,).
+    """
+    return {"context": np.where(rows[:, None], context, 0.0), "_context": rows.copy()} if context.size else {}
 
 
 def infos_of(out: Outcome, rows: BoolArray, made: npt.NDArray[np.int64], scenario: Scenario) -> Infos:

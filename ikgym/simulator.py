@@ -89,9 +89,8 @@ class Simulator:
             frames=self._nominal.allocate(),
             scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
-        self._plant: PlantRows | None = None
-        if not ideal:
-            self._plant = PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands)
+        plant = scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands
+        self._plant = None if ideal else PlantRows(*plant)
         self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
         self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
         self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
@@ -142,8 +141,7 @@ class Simulator:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
         if starts is None:
             chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
-            states = first_states(scenario, self._nominal.point, episodes, steps, chains)
-            state.q[rows], state.qdot[rows] = states
+            state.q[rows], state.qdot[rows] = first_states(scenario, self._nominal.point, episodes, steps, chains)
         else:
             state.q[rows], state.qdot[rows] = starts[rows], 0.0
         self._own_start[rows], self._ready = starts is None, 0
@@ -240,6 +238,11 @@ class Simulator:
     def true_q(self) -> FloatArray:
         """True joint coordinates, in [rad] or [m]. Shape (N, n)."""
         return self._state.q
+
+    @property
+    def context(self) -> FloatArray:
+        """The contexts of the rows' episodes, see :class:`ikgym.plant.DrawnPlant`. Shape (N, c)."""
+        return np.zeros((self.rows, 0)) if self._plant is None else self._plant.context
 
     @property
     def steps_made(self) -> npt.NDArray[np.int64]:

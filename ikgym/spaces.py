@@ -37,7 +37,7 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
     ahead = offsets(preview)
     q = SLACK * scenario.joint_bound()
     plant, noise = scenario.plant, CUT * np.asarray(scenario.plant.q_noise)
-    pose = _coordinate_bound(scenario, plant.reach(scenario.arm, q) + CUT * plant.pose_noise)
+    pose = _coordinate_bound(scenario, plant.reach(scenario.arm, q) + CUT * float(np.max(plant.pose_noise)))
     if scenario.initial_pose is not None:
         pose = np.maximum(pose, np.abs(scenario.initial_pose))
     times = scenario.times(int(scenario.points(preview)[-1]) + 1)

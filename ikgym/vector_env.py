@@ -19,22 +19,15 @@ from ikgym.env import OPTIONS, RedundantIKEnv, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
-from ikgym.rows import ArmRow, Infos, infos_of, last_observations
+from ikgym.rows import ArmRow, Hinting, Infos, contexts, infos_of, last_observations
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import BoolArray, FloatArray, whole_number
 
 
-class _Class(type):
-    """Adds a hint to the class name, which is all that Stable-Baselines3 shows of an environment that it refuses."""
-
-    def __repr__(cls) -> str:
-        return f"{super().__repr__()[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
-
-
 class RedundantIKVectorEnv(
-    gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]], metaclass=_Class
+    gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]], metaclass=Hinting
 ):
     """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
 
@@ -120,6 +113,11 @@ class RedundantIKVectorEnv(
         return self._simulator.preview
 
     @property
+    def context(self) -> FloatArray:
+        """The contexts of the rows' episodes. Shape (N, c)."""
+        return self._simulator.context
+
+    @property
     def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make_vec() sets
         """The specification, with the steps of an episode; None without `gym.make_vec`."""
         return self._spec
@@ -153,7 +151,7 @@ class RedundantIKVectorEnv(
                 likewise, None where an episode begins.
 
         Returns:
-            The observations of all rows, and empty infos.
+            The observations of all rows, and infos that are empty or have the contexts of the rows that begin.
 
         Raises:
             UnknownNameError: There is no such option.
@@ -175,7 +173,7 @@ class RedundantIKVectorEnv(
         self._begin(mask, starts, arm_seeds, steps)
         out = self._simulator.observe()
         self._record(out, begun=mask, rows=mask)
-        return observation(out), {}
+        return observation(out), contexts(self.context, mask)
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
         """One step of all arms; see the single environment for the returned values.
@@ -210,6 +208,7 @@ class RedundantIKVectorEnv(
         if beginning.any():
             self._begin(beginning)
             self._simulator.observe(beginning, out)
+            infos.update(contexts(self.context, beginning))
         self._record(out, begun=beginning, rows=self._begun)
         self._ended = np.zeros_like(ended) if same_step else ended
         return observation(out), rewards, lost, over, infos

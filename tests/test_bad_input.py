@@ -251,7 +251,9 @@ REFUSED = [
         *((name, -1.0) for name in ("zero", "link", "axis", "backlash", "noise", "q_noise", "pose_noise")),
         ("payload", np.inf), ("payload_step", 2.5), ("bandwidth", 0.0), ("bandwidth", (20, 10)),
         ("bandwidth", (10, np.inf)), ("bandwidth", (1, 2, 3)), ("command_delay", (12, 2)), ("command_delay", (1.5, 2)),
-        ("q_delay", 0.5), ("pose_every", 0), ("pose_missing", 1.01), ("arms", "panda-2"), ("arms", ("panda-2",)),
+        ("q_delay", 0.5), ("pose_every", 0), ("pose_every", (0, 2)), ("pose_noise", (2, 1)), ("calibration", -1.0),
+        ("from_middle", (0.5, 0.5)), ("from_middle", 0.5), ("from_middle", (0, 2)), ("pose_missing", 1.01),
+        ("arms", "panda-2"), ("arms", ("panda-2",)),
     )),
     *((name, lambda name=name, x=x: FAST.replace(steps=20, plant=Plant(**{name: x}))) for name, x in (
         ("zero", (1.0, 2.0)), ("bias", (1.0, 2.0)), ("command_delay", (3, 21)), ("q_delay", 21), ("pose_delay", 21),
@@ -295,6 +297,7 @@ REFUSED = [
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
     ("RedundantIK-v0", lambda: ikgym.rl.TrackObservation(gym.make("CartPole-v1"))),
     ("its own observation", lambda: ikgym.rl.TrackObservation(ikgym.rl.make(FAST))),
+    ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
     ("its own observation", lambda: ikgym.rl.vector.TrackObservation(ikgym.rl.make_vec(FAST, 2))),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
         ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("zero", 0.0), ("fine", 0.0),

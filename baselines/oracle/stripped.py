@@ -29,7 +29,7 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
     if plant.ideal and arm_seed is None:
         return scenario
     drawn = scenario.drawn_plant(seed, arm_seed)
-    kept = Plant(payload=plant.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
+    kept = Plant(payload=drawn.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
     start = scenario.start_of(seed, arm_seed) if scenario.jogs else scenario.start
     return scenario.replace(arm=drawn.arm, model=scenario.model, plant=kept, start=start)
 
@@ -46,4 +46,4 @@ def strips(scenario: Scenario) -> bool:
 
 
 #: The fields of a plant that say which arm moves.
-KINEMATICS = ("zero", "link", "axis", "payload", "payload_step", "arms")
+KINEMATICS = ("zero", "link", "axis", "payload", "payload_step", "arms", "calibration", "load", "from_middle")

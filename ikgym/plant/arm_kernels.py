@@ -13,8 +13,9 @@ from ikgym.kernels.random_numbers import normal, share, stream
 
 Floats = npt.NDArray[np.float64]
 
-# The streams of an arm's key, and where those of the noises begin, which may have the same one.
-ZERO, LINK, AXIS, WHICH, BANDWIDTH, DELAY = range(6)
+# The streams of an arm's key, those of its ranges, and where those of the noises begin, which may have the same one.
+ZERO, LINK, AXIS, WHICH = range(4)
+RANGE_STREAMS = (4, 5, 20, 21, 22, 23, 24)
 ARM_STREAMS = 6
 
 
@@ -44,6 +45,38 @@ class Spread(NamedTuple):
     axis: float
 
 
+class Numbers(NamedTuple):
+    """What episodes draw from ranges, by the names of :class:`ikgym.Plant`. Shapes (k,)."""
+
+    bandwidth: Floats
+    command_delay: Floats
+    calibration: Floats
+    load: Floats
+    pose_noise: Floats
+    pose_rotation_noise: Floats
+    pose_every: Floats
+
+
+class Ranges(NamedTuple):
+    """Ranges that :class:`Numbers` are drawn from.
+
+    Attributes:
+        low: Their lower ends. Shape (r,).
+        high: Their upper ends. Shape (r,).
+        whole: Where whole numbers are drawn, both ends included. Shape (r,).
+        streams: The streams of an arm's key. Shape (r,).
+        near: How far from the middle numbers are drawn at least, as a share of half the range.
+        far: The same, at most.
+    """
+
+    low: Floats
+    high: Floats
+    whole: npt.NDArray[np.bool_]
+    streams: npt.NDArray[np.uint64]
+    near: float
+    far: float
+
+
 class Arms(NamedTuple):
     """N drawn arms, as :class:`ikgym.kernels.kinematics.Chain` has them: each without its payload, then with it.
 
@@ -61,42 +94,44 @@ class Arms(NamedTuple):
 
 
 @kernel
-def draw_arms(spread, keys, rows, arms):
+def draw_arms(spread, keys, rows, calibration, load, arms):
     """Draws the arms of some rows.
 
     Args:
         spread: A :class:`Spread`.
         keys: One a row that is drawn. Shape (k,).
         rows: Which rows they are. Shape (k,).
+        calibration: Factors of zeros, links and tilts. Shape (k,).
+        load: Factors of the payload. Shape (k,).
         arms: An :class:`Arms`, which receives them.
     """
     payload = np.any(spread.payload)
     for i in range(keys.shape[0]):
-        _draw_arm(spread, keys[i], rows[i], 0, arms)
+        _draw_arm(spread, keys[i], rows[i], 0, calibration[i], load[i], arms)
         if payload:
-            _draw_arm(spread, keys[i], rows[i], 1, arms)
+            _draw_arm(spread, keys[i], rows[i], 1, calibration[i], load[i], arms)
         else:
             _copy_arm(rows[i], arms)
 
 
 @uncounted
-def _draw_arm(spread, key, row, loaded, arms):
-    """The arm of a row, without its payload or with it."""
+def _draw_arm(spread, key, row, loaded, calibration, load, arms):
+    """The arm of a row, without its payload or with it, by the factors of the row."""
     offsets, axes = arms.offsets[row, loaded], arms.axes[row, loaded]
     tool, tool_rotation = arms.tool[row, loaded], arms.tool_rotation[row, loaded]
     n, of_links, of_axes, of_zeros = spread.prismatic.shape[0], stream(key, LINK), stream(key, AXIS), stream(key, ZERO)
     which = int(share(stream(key, WHICH), np.uint64(0)) * spread.offsets.shape[0])
     for j in range(n):
-        _shift(of_links, j, spread.link, spread.offsets[which, j], offsets[j])
-        _tilt(of_axes, j, spread.axis, spread.axes[which, j], axes[j])
-    _shift(of_links, n, spread.link, spread.tool[which], tool)
+        _shift(of_links, j, calibration * spread.link, spread.offsets[which, j], offsets[j])
+        _tilt(of_axes, j, calibration * spread.axis, spread.axes[which, j], axes[j])
+    _shift(of_links, n, calibration * spread.link, spread.tool[which], tool)
     _copy(spread.tool_rotation[which], tool_rotation)
     for j in range(n):
         zero = 0.0
         if spread.zero[j] != 0.0:
-            zero = spread.zero[j] * normal(of_zeros, np.uint64(j))
+            zero = calibration * spread.zero[j] * normal(of_zeros, np.uint64(j))
         if loaded == 1:
-            zero += spread.payload[j]
+            zero += load * spread.payload[j]
         if zero != 0.0:
             _begin_at(j, zero, spread.prismatic, offsets, axes, tool, tool_rotation)
 
@@ -118,21 +153,26 @@ def _copy(vectors, out):
 
 
 @kernel
-def draw_loops(bandwidth, delay, keys, drawn_bandwidth, drawn_delay):
-    """Draws velocity loops and delays of commands.
+def draw_ranges(ranges, keys, out, context):
+    """Draws numbers from ranges.
 
     Args:
-        bandwidth: Lowest and highest bandwidth in [Hz]. Shape (2,).
-        delay: Lowest and highest delay in steps. Shape (2,).
+        ranges: A :class:`Ranges`.
         keys: One a row that is drawn. Shape (k,).
-        drawn_bandwidth: Receives the bandwidths in [Hz]. Shape (k,).
-        drawn_delay: Receives the delays in steps. Shape (k,).
+        out: Receives the numbers. Shape (r, k).
+        context: Receives those of ranges with two ends, from -1 at the lower to 1 at the upper one. Shape (k, c).
     """
     for i in range(keys.shape[0]):
-        drawn_bandwidth[i] = bandwidth[0]
-        if bandwidth[0] < bandwidth[1]:
-            drawn_bandwidth[i] += (bandwidth[1] - bandwidth[0]) * share(stream(keys[i], BANDWIDTH), np.uint64(0))
-        drawn_delay[i] = delay[0] + int((delay[1] - delay[0] + 1) * share(stream(keys[i], DELAY), np.uint64(0)))
+        column = 0
+        for number in range(ranges.low.shape[0]):
+            out[number, i] = low = ranges.low[number]
+            width = ranges.high[number] - low
+            if low < ranges.high[number]:
+                away = _away(share(stream(keys[i], ranges.streams[number]), np.uint64(0)), ranges.near, ranges.far)
+                drawn = min(math.floor((width + 1.0) * away), width) if ranges.whole[number] else width * away
+                out[number, i] += drawn
+                context[i, column] = 2.0 * drawn / width - 1.0
+                column += 1
 
 
 @kernel
@@ -148,6 +188,15 @@ def stream_rows(keys, rows, out):
         out[rows[i], 0] = keys[i]
         for number in range(1, out.shape[1]):
             out[rows[i], number] = stream(keys[i], np.uint64(ARM_STREAMS + number))
+
+
+@inlined
+def _away(place, near, far):
+    """A place on (0, 1), moved so far from the middle that it is between two shares of the way to the ends."""
+    if near == 0.0 and far == 1.0:
+        return place
+    off = 2.0 * place - 1.0
+    return 0.5 + 0.5 * math.copysign(near + (far - near) * abs(off), off)
 
 
 @inlined

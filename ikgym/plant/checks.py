@@ -47,13 +47,36 @@ def frequency(name: str, value: Any) -> Drawn:
     return _range(name, low, high, value)
 
 
-def steps(name: str, value: Any) -> int | tuple[int, int]:
+def numbers(name: str, value: Any) -> Drawn:
+    """A number of at least 0, or a range of them.
+
+    Raises:
+        InvalidInputError: It is neither, or the range is the wrong way round.
+    """
+    ends = _ends(name, value, "numbers of at least 0")
+    low, high = (number(name, end, at_least=0.0, at_most=LARGEST) for end in ends)
+    return _range(name, low, high, value)
+
+
+def shares(name: str, value: Any) -> tuple[float, float]:
+    """Two different shares, the smaller one first.
+
+    Raises:
+        InvalidInputError: They are no such shares.
+    """
+    near, far = (share(name, end) for end in _ends(name, value, "shares"))
+    if near >= far:
+        raise InvalidInputError(f"{name}: expected two shares (near, far) with near < far, got {value!r}.")
+    return near, far
+
+
+def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
     """A number of steps, or a range of them.
 
     Raises:
         InvalidInputError: It is neither, or the range is the wrong way round.
     """
-    low, high = (whole_number(name, end, at_least=0) for end in _ends(name, value, "whole numbers"))
+    low, high = (whole_number(name, end, at_least=at_least) for end in _ends(name, value, "whole numbers"))
     return _range(name, low, high, value)  # type: ignore[return-value]  # whole numbers come as such
 
 

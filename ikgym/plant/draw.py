@@ -10,8 +10,10 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
-from ikgym.plant.arm_kernels import Arms, Spread, draw_arms, draw_loops
-from ikgym.plant.plant import Plant
+from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
+from ikgym.plant.checks import PerJoint
+from ikgym.plant.plant import WHOLE, Plant
+from ikgym.plant.severity import scaled
 from ikgym.validation import FloatArray, whole_number
 
 Keys = npt.NDArray[np.uint64]
@@ -27,6 +29,9 @@ class DrawnPlant:
         payload_step: Steps made when the payload is taken up.
         bandwidth: Of the velocity loops in [Hz], inf for none.
         command_delay: Steps after which a command reaches the drive.
+        payload: Shift of the joints' zeros by the payload, in [rad] or [m].
+        context: All that was drawn from a range, see :attr:`Plant.context`: -1 at its lower end, 1 at its upper end.
+            Shape (c,).
     """
 
     arm: Arm
@@ -34,6 +39,8 @@ class DrawnPlant:
     payload_step: int
     bandwidth: float
     command_delay: int
+    payload: PerJoint
+    context: FloatArray
 
 
 class Draws:
@@ -59,8 +66,10 @@ class Draws:
             plant.link,
             plant.axis,
         )
-        self._bandwidth = np.array(np.broadcast_to(plant.bandwidth, 2), dtype=np.float64)
-        self._delay = np.array(np.broadcast_to(plant.command_delay, 2), dtype=np.int64)
+        low, high = np.array([np.broadcast_to(getattr(plant, name), 2) for name in Numbers._fields], dtype=np.float64).T
+        whole = np.array([name in WHOLE for name in Numbers._fields])
+        streams = np.array(RANGE_STREAMS, dtype=np.uint64)
+        self._ranges = Ranges(low.copy(), high.copy(), whole, streams, *plant.from_middle)
 
     def blank(self, rows: int) -> Arms:
         """Empty arrays for so many arms."""
@@ -69,30 +78,33 @@ class Draws:
             np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, 3)), np.zeros((rows, 2, 3, 3))
         )
 
-    def arms(self, keys: Keys, rows: npt.NDArray[np.int64], out: Arms) -> None:
+    def arms(self, keys: Keys, rows: npt.NDArray[np.int64], numbers: Numbers, out: Arms) -> None:
         """Draws the arms of some rows.
 
         Args:
             keys: One a row. Shape (k,).
             rows: The numbers of the rows. Shape (k,).
+            numbers: What the keys draw from ranges.
             out: Receives the arms.
         """
-        draw_arms(self._spread, keys, rows, out)
+        draw_arms(self._spread, keys, rows, numbers.calibration, numbers.load, out)
 
-    def loops(self, keys: Keys) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Bandwidths in [Hz] and delays of commands in steps. Shapes (k,)."""
-        bandwidths, delays = np.empty(len(keys)), np.empty(len(keys), dtype=np.int64)
-        draw_loops(self._bandwidth, self._delay, keys, bandwidths, delays)
-        return bandwidths, delays
+    def numbers(self, keys: Keys) -> tuple[Numbers, FloatArray]:
+        """What is drawn from ranges, and the contexts. Shapes (k,), (k, c)."""
+        out, context = np.empty((len(Numbers._fields), len(keys))), np.empty((len(keys), len(self._plant.context)))
+        draw_ranges(self._ranges, keys, out, context)
+        return Numbers(*out), context
 
     def one(self, key: int) -> DrawnPlant:
         """The plant that a key draws."""
         keys, out = np.array([key], dtype=np.uint64), self.blank(1)
-        self.arms(keys, np.zeros(1, dtype=np.int64), out)
-        bandwidths, delays = self.loops(keys)
+        numbers, context = self.numbers(keys)
+        self.arms(keys, np.zeros(1, dtype=np.int64), numbers, out)
         before, after = (self._made(*(part[0, loaded] for part in out)) for loaded in range(2))
         loaded = after if np.any(self._plant.payload) else before
-        return DrawnPlant(before, loaded, self._plant.payload_step, float(bandwidths[0]), int(delays[0]))
+        bandwidth, delay, load = float(numbers.bandwidth[0]), int(numbers.command_delay[0]), float(numbers.load[0])
+        payload = scaled(self._plant.payload, load)
+        return DrawnPlant(before, loaded, self._plant.payload_step, bandwidth, delay, payload, context[0])
 
     def _made(self, offsets: FloatArray, axes: FloatArray, tool: FloatArray, tool_rotation: FloatArray) -> Arm:
         return self._arm.replace(offsets=offsets, axes=axes, tool=tool, tool_rotation=tool_rotation)

@@ -14,6 +14,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.random_numbers import CUT
 from ikgym.plant import checks, severity
+from ikgym.plant.arm_kernels import Numbers
 from ikgym.plant.checks import Drawn, PerJoint
 from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
 
@@ -21,7 +22,9 @@ from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, sho
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise")
 SIGNED = ("payload", "bias")
 #: Fields with one number of at least 0.
-SCALARS = ("link", "axis", "pose_noise", "pose_rotation_noise")
+SCALARS = ("link", "axis")
+#: Fields with one number of at least 0, or a range; those that are whole numbers.
+DRAWN, WHOLE = ("calibration", "load", "pose_noise", "pose_rotation_noise"), ("command_delay", "pose_every")
 #: Delays of measurements, in steps.
 DELAYS = ("q_delay", "pose_delay")
 
@@ -46,6 +49,10 @@ class Plant(Frozen):
     A camera that measures every E-th step does so at the steps 0, E, 2 E, …; the newest measurement that has arrived is
     observed. Noise belongs to the measurement, and stays with it as long as it is shown.
 
+    *Context.* Some numbers may be ranges (low, high), from which episodes draw uniformly, whole numbers with both ends
+    included: what they draw is the context of the episode, which `arm_seed` keeps. The reset's `info` has it, and the
+    observation of a learner that is shown it, see :class:`ikgym.rl.Task`.
+
     Args:
         zero: Standard deviation of the joints' zeros, in [rad] or [m]. A number, or one a joint.
         link: Standard deviation of each of the three parts of each offset from joint to joint, and of the tool point,
@@ -55,23 +62,26 @@ class Plant(Frozen):
         payload_step: Steps made when the payload is taken up; one after the end of the episode is never reached.
         arms: Arms one of which moves in place of `scenario.arm`, drawn each episode; their limits are not used. The
             deviations above are added to it.
+        calibration: Factor of `zero`, `link` and `axis`. A number, or a range.
+        load: Factor of `payload`. A number, or a range.
         bandwidth: Bandwidth f of a first-order velocity loop, in [Hz]: a step closes the share 1 − exp(−2π f Δt) of the
-            gap to the commanded velocity. A number, inf for none, or a range (low, high) from which episodes draw
-            uniformly.
-        command_delay: Steps after which a command reaches the drive, which stands still before. A whole number, or a
-            range (low, high) from which episodes draw uniformly, both ends included.
+            gap to the commanded velocity. A number, inf for none, or a range.
+        command_delay: Steps after which a command reaches the drive, which stands still before. A number, or a range.
         backlash: Width of the backlash in [rad] or [m]. A number, or one a joint.
         bias: Constant part of the joint velocity, in [rad/s] or [m/s]. A number, or one a joint.
         noise: Bound of a uniform random part of the joint velocity, drawn anew at each step, in [rad/s] or [m/s]. A
             number, or one a joint.
         q_noise: Standard deviation of the measured joint coordinates, in [rad] or [m]. A number, or one a joint.
-        pose_noise: Standard deviation of each of the three parts of the measured position, in [m].
+        pose_noise: Standard deviation of each of the three parts of the measured position, in [m]. A number, or a
+            range.
         pose_rotation_noise: Standard deviation of each of the three parts of the rotation vector by which the measured
-            orientation is off, in [rad]. Nothing where the task has no orientation.
+            orientation is off, in [rad]. A number, or a range. Nothing where the task has no orientation.
         q_delay: Steps by which joint coordinates are observed late.
         pose_delay: Steps by which the pose is observed late.
-        pose_every: Steps from one measurement of the pose to the next.
+        pose_every: Steps from one measurement of the pose to the next. A number, or a range.
         pose_missing: Share of the measurements of the pose that are lost.
+        from_middle: How far from the middle of their ranges numbers are drawn, from 0 in the middle to 1 at the ends:
+            (0, 0.5) is the inner half, (0.5, 1) what is outside of it.
 
     Raises:
         InvalidInputError: A number is not finite, of the wrong sign or beyond 1e12, a share above 1, a range the wrong
@@ -84,28 +94,33 @@ class Plant(Frozen):
     payload: PerJoint = 0.0
     payload_step: int = 0
     arms: Sequence[Arm] = ()
+    calibration: Drawn = 1.0
+    load: Drawn = 1.0
     bandwidth: Drawn = math.inf
     command_delay: int | tuple[int, int] = 0
     backlash: PerJoint = 0.0
     bias: PerJoint = 0.0
     noise: PerJoint = 0.0
     q_noise: PerJoint = 0.0
-    pose_noise: float = 0.0
-    pose_rotation_noise: float = 0.0
+    pose_noise: Drawn = 0.0
+    pose_rotation_noise: Drawn = 0.0
     q_delay: int = 0
     pose_delay: int = 0
-    pose_every: int = 1
+    pose_every: int | tuple[int, int] = 1
     pose_missing: float = 0.0
+    from_middle: tuple[float, float] = (0.0, 1.0)
 
     def __post_init__(self) -> None:
         settled: dict[str, Any] = {
             **{name: checks.joint_numbers(name, getattr(self, name), signed=name in SIGNED) for name in JOINT_WISE},
             **{name: number(name, getattr(self, name), at_least=0.0, at_most=LARGEST) for name in SCALARS},
+            **{name: checks.numbers(name, getattr(self, name)) for name in DRAWN},
             **{name: whole_number(name, getattr(self, name), at_least=0) for name in ("payload_step", *DELAYS)},
             "bandwidth": checks.frequency("bandwidth", self.bandwidth),
             "command_delay": checks.steps("command_delay", self.command_delay),
-            "pose_every": whole_number("pose_every", self.pose_every, at_least=1),
+            "pose_every": checks.steps("pose_every", self.pose_every, at_least=1),
             "pose_missing": checks.share("pose_missing", self.pose_missing),
+            "from_middle": checks.shares("from_middle", self.from_middle),
             "arms": _arms(self.arms),
         }
         for name, value in settled.items():
@@ -179,12 +194,12 @@ class Plant(Frozen):
     def ideal(self) -> bool:
         """Whether all effects are off."""
         driven = self.bandwidth != math.inf or self.longest_command_delay > 0
-        return not (self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS))
+        return not (self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS, *DRAWN[2:]))
 
     @property
     def late(self) -> bool:
         """Whether observations may belong to an earlier step."""
-        return self._on("q_delay", "pose_delay", "pose_missing") or self.pose_every > 1
+        return self._on("q_delay", "pose_delay", "pose_missing") or bool(np.max(self.pose_every) > 1)
 
     @property
     def other_arm(self) -> bool:
@@ -194,8 +209,13 @@ class Plant(Frozen):
     @property
     def draws_arm(self) -> bool:
         """Whether episodes draw the arm or its drives, which `arm_seed` can keep."""
-        ranges = (one for one in (self.bandwidth, self.command_delay) if isinstance(one, tuple))
-        return self._on("zero", "link", "axis") or len(self.arms) > 1 or any(low < high for low, high in ranges)
+        return self._on("zero", "link", "axis") or len(self.arms) > 1 or bool(self.context)
+
+    @functools.cached_property
+    def context(self) -> tuple[str, ...]:
+        """The fields that are ranges, from which episodes draw."""
+        ends = {name: np.broadcast_to(getattr(self, name), 2) for name in Numbers._fields}
+        return tuple(name for name, (low, high) in ends.items() if low < high)
 
     @property
     def random(self) -> bool:
@@ -219,8 +239,9 @@ class Plant(Frozen):
             arm: The arm of the data sheet.
             travel: Largest absolute joint coordinates; only those of prismatic joints count. Shape (n,).
         """
-        shifted = np.abs(self.payload) + CUT * np.asarray(self.zero)
-        links = CUT * math.sqrt(3.0) * self.link * (arm.joints + 1)
+        factor, load = np.max(self.calibration), np.max(self.load)
+        shifted = load * np.abs(self.payload) + CUT * factor * np.asarray(self.zero)
+        links = CUT * math.sqrt(3.0) * factor * self.link * (arm.joints + 1)
         return float(max(one.reach(travel + shifted) for one in self.arms or (arm,)) + links)
 
     def _on(self, *names: str) -> bool:

@@ -76,23 +76,24 @@ class PlantRows:
         )
         self.sensors = Sensors(
             every_joint(plant.q_noise),
-            plant.pose_noise,
-            plant.pose_rotation_noise,
             plant.q_delay,
             plant.pose_delay,
-            plant.pose_every,
             plant.pose_missing,
         )
         self.arms = self._draws.blank(rows)
+        self.context = np.zeros((rows, len(plant.context)))
         self.state = PlantState(
             keys=np.zeros((rows, STREAMS), dtype=np.uint64),
             lag=np.ones(rows),
             delay=np.zeros(rows, dtype=np.int64),
+            pose_noise=np.zeros(rows),
+            pose_rotation_noise=np.zeros(rows),
+            pose_every=np.ones(rows, dtype=np.int64),
             drive=np.zeros((rows, n)),
             play=np.zeros((rows, n)),
             commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
             q=np.zeros((rows, plant.q_delay + 1, n)),
-            pose=np.zeros((rows, plant.pose_delay // plant.pose_every + 1, coordinates)),
+            pose=np.zeros((rows, plant.pose_delay // int(np.min(plant.pose_every)) + 1, coordinates)),
             shown=np.zeros((rows, coordinates)),
             shown_step=np.zeros(rows, dtype=np.int64),
         )
@@ -101,7 +102,12 @@ class PlantRows:
     def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
         """Numbers that a row takes."""
         kept = joints * (plant.longest_command_delay + 1 + commands + plant.q_delay + 1)
-        return 2 * (6 * joints + 12) + kept + coordinates * (plant.pose_delay // plant.pose_every + 2) + 4 * joints
+        return (
+            2 * (6 * joints + 12)
+            + kept
+            + coordinates * (plant.pose_delay // int(np.min(plant.pose_every)) + 2)
+            + 4 * joints
+        )
 
     def begin(
         self,
@@ -124,9 +130,12 @@ class PlantRows:
             kept = [arm_seeds[row] for row in rows.tolist()]
             arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, kept, strict=True)]
         of_arms = np.array(arm_keys, dtype=np.uint64)
-        self._draws.arms(of_arms, rows, self.arms)
-        bandwidths, self.state.delay[rows] = self._draws.loops(of_arms)
-        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * bandwidths * self._dt)
+        numbers, self.context[rows] = self._draws.numbers(of_arms)
+        self._draws.arms(of_arms, rows, numbers, self.arms)
+        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
+        self.state.delay[rows] = numbers.command_delay
+        for name in ("pose_noise", "pose_rotation_noise", "pose_every"):
+            getattr(self.state, name)[rows] = getattr(numbers, name)
         if noise_seeds is not None:
             keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
         stream_rows(np.array(keys, dtype=np.uint64), rows, self.state.keys)

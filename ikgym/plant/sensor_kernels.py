@@ -50,25 +50,25 @@ def missing(sensors, keys, number):
 
 
 @inlined
-def measure_pose(sensors, keys, kind, step, rotation, position, kept, shown):
+def measure_pose(sensors, plant, row, kind, step, rotation, position):
     """Measures a pose where it is time to, and takes over what has arrived.
 
     Args:
         sensors: A :class:`ikgym.plant.step.Sensors`.
-        keys: Of the row's streams. Shape (5,).
+        plant: A :class:`ikgym.plant.step.PlantState`, whose poses on their way and shown poses are changed in place.
+        row: The arm.
         kind: The kind of task coordinates.
         step: Steps made.
         rotation: Orientation, which the noise may turn. Shape (3, 3).
         position: Position in [m], which the noise may shift. Shape (3,).
-        kept: Measurements that are on their way. Shape (delay // every + 1, m).
-        shown: Receives what has arrived, if anything has. Shape (m,).
 
     Returns:
         The step of the measurement that has arrived, -1 where none has.
     """
-    every, room = sensors.pose_every, kept.shape[0]
+    every, keys, kept, shown = plant.pose_every[row], plant.keys[row], plant.pose[row], plant.shown[row]
+    room = kept.shape[0]
     if step % every == 0 and not missing(sensors, keys, step // every):
-        blur(sensors.pose_noise, sensors.pose_rotation_noise, keys, kind, step, rotation, position)
+        blur(plant.pose_noise[row], plant.pose_rotation_noise[row], keys, kind, step, rotation, position)
         task_kernels.coordinates(kind, rotation, position, kept[step // every % room])
     late = step - sensors.pose_delay
     arrived = (late > 0 and late % every == 0 and not missing(sensors, keys, late // every)) or step == 0

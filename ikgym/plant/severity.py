@@ -23,8 +23,8 @@ def knowledge(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
     """
     out = {name: scaled(values[name], severity) for name in KNOWLEDGE}
     out |= {name: round(severity * values[name]) for name in ("q_delay", "pose_delay")}
-    payload_step = values["payload_step"] if severity > 0.0 else 0
-    return out | {"pose_every": 1 + round(severity * (values["pose_every"] - 1)), "payload_step": payload_step}
+    out["pose_every"] = whole(values["pose_every"], severity, least=1)
+    return out | {"payload_step": values["payload_step"] if severity > 0.0 else 0}
 
 
 def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
@@ -38,9 +38,15 @@ def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
     out = {name: scaled(values[name], severity) for name in DRIVES}
     if severity == 0.0:
         return out | {"command_delay": 0, "bandwidth": math.inf}
-    delay = values["command_delay"]
-    late = tuple(round(severity * end) for end in delay) if isinstance(delay, tuple) else round(severity * delay)
+    late = whole(values["command_delay"], severity)
     return out | {"command_delay": late, "bandwidth": scaled(values["bandwidth"], 1.0 / severity)}
+
+
+def whole(value: Any, factor: float, least: int = 0) -> Any:
+    """A whole number, or each of a tuple of them, with its excess over the least one times a factor, rounded."""
+    if isinstance(value, tuple):
+        return tuple(whole(part, factor, least) for part in value)
+    return least + round(factor * (value - least))
 
 
 def scaled(value: Any, factor: float) -> Any:

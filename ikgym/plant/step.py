@@ -40,11 +40,8 @@ class Sensors(NamedTuple):
     """Sensor parameters of all rows, by the names of :class:`ikgym.Plant`. ``q_noise`` has shape (n,)."""
 
     q_noise: Floats
-    pose_noise: float
-    pose_rotation_noise: float
     q_delay: int
     pose_delay: int
-    pose_every: int
     pose_missing: float
 
 
@@ -55,6 +52,9 @@ class PlantState(NamedTuple):
         keys: Of the rows' streams of random numbers. Shape (N, 5).
         lag: The share of what is missing to a velocity that a step makes up for, 1 without lag. Shape (N,).
         delay: Steps after which a command reaches the drive. Shape (N,).
+        pose_noise: Standard deviation of each part of a measured position, in [m]. Shape (N,).
+        pose_rotation_noise: The same of the rotation vector of the orientation, in [rad]. Shape (N,).
+        pose_every: Steps from one measurement of the pose to the next. Shape (N,).
         drive: Velocities of the drives in [rad/s] or [m/s]. Shape (N, n).
         play: How far drives are from the middle of their backlash, in [rad] or [m]. Shape (N, n).
         commands: The last commands in [rad/s] or [m/s]; that of step k is number k mod D. Shape (N, D, n).
@@ -67,6 +67,9 @@ class PlantState(NamedTuple):
     keys: npt.NDArray[np.uint64]
     lag: Floats
     delay: Integers
+    pose_noise: Floats
+    pose_rotation_noise: Floats
+    pose_every: Integers
     drive: Floats
     play: Floats
     commands: Floats
@@ -173,7 +176,7 @@ def _sense(sensors, plant, kind, row, now, q, rotation, position, shown, more):
     """Shows what the sensors do. The pose in the scratch is blurred for it, after all else is done with it."""
     keys = plant.keys[row]
     more[0][row, 0] = measure_q(sensors, keys, row, now, q, plant.q, shown[0])
-    arrived = measure_pose(sensors, keys, kind, now, rotation, position, plant.pose[row], plant.shown[row])
+    arrived = measure_pose(sensors, plant, row, kind, now, rotation, position)
     if arrived >= 0:
         plant.shown_step[row] = arrived
     more[1][row, 0] = now - plant.shown_step[row]

@@ -33,6 +33,7 @@ class Task(Frozen):
         coarse: Unit of errors in the observation, in [m].
         fine: Unit of the hyperbolic tangent of the same, in [m].
         counted: Steps at the end of an episode whose cost is scored; None for all.
+        context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
     """
 
     scenario: str | Scenario = "learning-track"
@@ -46,6 +47,7 @@ class Task(Frozen):
     coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
+    context: bool = False
 
     def arm(self, **options: Any) -> gym.Env[Any, Any]:
         """One arm, wrapped; the options are those of :class:`ikgym.RedundantIKEnv`."""
@@ -66,7 +68,7 @@ class Task(Frozen):
         """The environment in the wrappers of a module."""
         env = kinds.ShareAction(env, self.share)
         env = kinds.DistanceReward(env, self.radian, self.zero)
-        env = kinds.TrackObservation(env, self.radian, self.coarse, self.fine)
+        env = kinds.TrackObservation(env, self.radian, self.coarse, self.fine, self.context)
         return env if self.history == 1 else kinds.History(env, self.history)
 
 

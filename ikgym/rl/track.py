@@ -14,7 +14,7 @@ from ikgym.rl.stages import Rows, Stage, Told
 from ikgym.rl.track_kernels import MOST, distance_rewards, track_rows
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray, float_array, number, shortened
+from ikgym.validation import BoolArray, FloatArray, flag, float_array, number, shortened
 
 #: Error in [m] below which an agent gains little more: Δx of the cost.
 UNIT = 1e-3
@@ -25,7 +25,9 @@ OLDEST = 10.0
 class TrackStage(Stage):
     """See :class:`ikgym.rl.TrackObservation`."""
 
-    def __init__(self, env: Any, radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01) -> None:
+    def __init__(
+        self, env: Any, radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01, context: bool = False
+    ) -> None:
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}
         scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())
@@ -34,21 +36,34 @@ class TrackStage(Stage):
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         self._own = 2 * (scenario.joints + len(env.unwrapped.preview) * int(twist_size(scenario.task.kind)))
         added = spaces.flatdim(spaces.Dict({key: space[key] for key in self._more}))
-        self.observation_space = spaces.Box(-MOST, MOST, (self._own + added,), np.float32)
+        self._env, self._shown = env.unwrapped, flag("context", context)
+        if context and not scenario.plant.context:
+            raise InvalidInputError(f"context: expected a plant with numbers drawn from ranges, got {scenario.plant}.")
+        self._context = self._contexts()
+        self.observation_space = spaces.Box(-MOST, MOST, (self._own + added + self._context.shape[1],), np.float32)
 
     def observation(self, observation: Any, begun: BoolArray) -> Any:
         """The features. Shape (N, f)."""
         del begun
+        self._context = self._contexts()
+        return self._features(observation, self._context)
+
+    def _contexts(self) -> FloatArray:
+        """What is shown of the contexts of all rows. Shape (N, c) or (N, 0)."""
+        context = np.atleast_2d(self._env.context)
+        return context.copy() if self._shown else context[:, :0]
+
+    def _features(self, observation: Any, context: FloatArray) -> Any:
         rows = len(observation["q"])
         out = np.empty((rows, self._own))
         track_rows(*self._command, *(observation[key] for key in ("q", "qdot", "pose", "nominal")), out)
         parts = [out, *(self._scaled(key, observation[key]).reshape(rows, -1) for key in self._more)]
-        return np.concatenate(parts, axis=1).astype(np.float32)
+        return np.concatenate([*parts, context], axis=1).astype(np.float32)
 
     def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
         """The features of these rows. Shapes (f,)."""
         together = {key: np.array([one[key] for one in observations]) for key in observations[0]}
-        return list(self.observation(together, np.zeros(len(rows), dtype=np.bool_)))
+        return list(self._features(together, self._context[rows]))  # those of the episodes that have ended
 
     def _scaled(self, key: str, value: FloatArray) -> FloatArray:
         """Past commands as shares of the largest joint velocities, ages in units of ten steps."""

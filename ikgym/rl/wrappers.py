@@ -80,6 +80,7 @@ class TrackObservation(ArmWrapper):
 `coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
     | 1 each | ages of `q` and `pose` in units of ten steps, where sensors are slow or late |
     | h n | the last h commands, as shares of the largest joint velocities, where the environment shows them |
+    | c | the context of the episode, from -1 to 1, with `context` |
 
     Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
     joint 1, so that a turn of joint 1 changes none of them; from the base frame where joint 1 is prismatic, and for
@@ -91,14 +92,23 @@ class TrackObservation(ArmWrapper):
         radian: Weight of 1 rad in [m], above 0.
         coarse: In [m], above 0.
         fine: In [m], above 0.
+        context: Whether the context of the episode is shown.
 
     Raises:
-        InvalidInputError: A parameter is out of its range, or the observation was changed.
+        InvalidInputError: A parameter is out of its range, the observation was changed, or the plant draws nothing from
+            ranges.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], radian: float = 1.0, coarse: float = 0.03, fine: float = 0.01) -> None:
-        stage = TrackStage(env, radian, coarse, fine)
-        super().__init__(env, stage, radian=radian, coarse=coarse, fine=fine)
+    def __init__(
+        self,
+        env: gym.Env[Any, Any],
+        radian: float = 1.0,
+        coarse: float = 0.03,
+        fine: float = 0.01,
+        context: bool = False,
+    ) -> None:
+        stage = TrackStage(env, radian, coarse, fine, context)
+        super().__init__(env, stage, radian=radian, coarse=coarse, fine=fine, context=context)
 
 
 class ShareAction(ArmWrapper):

@@ -24,7 +24,8 @@ EFFECTS = {
     "pose_missing": {"pose_missing": 0.4},
 }
 ALL = Plant(**{name: value for effect in EFFECTS.values() for name, value in effect.items()})
-PLANTS = {**{name: Plant(**effect) for name, effect in EFFECTS.items()}, "all": ALL}
+CONTEXT = ikgym.scenarios.get("learning-context").plant.replace(payload_step=4, pose_delay=3, from_middle=(0.0, 1.0))
+PLANTS = {"context": CONTEXT, **{name: Plant(**effect) for name, effect in EFFECTS.items()}, "all": ALL}
 
 
 def panda(plant=None, steps=12, **changes):

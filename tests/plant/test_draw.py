@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ikgym
+from baselines.fingerprints import fingerprint
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant.draw import Draws, episode_key
@@ -19,7 +20,7 @@ def arms(plant, arm=PANDA):
     """The arms that all keys draw, unloaded."""
     draws = Draws(plant, arm)
     out = draws.blank(len(KEYS))
-    draws.arms(KEYS, ROWS, out)
+    draws.arms(KEYS, ROWS, draws.numbers(KEYS)[0], out)
     return type(out)(*[part[:, 0] for part in out])
 
 
@@ -95,16 +96,75 @@ def test_one_of_some_arms_is_taken():
         assert identical(getattr(one, limit), getattr(PANDA, limit))
 
 
-def test_loops_are_drawn_from_their_ranges():
-    bandwidths, delays = Draws(Plant(bandwidth=(10, 20), command_delay=(2, 4)), PANDA).loops(KEYS)
+def numbers(plant):
+    """What all keys draw from ranges, and the contexts."""
+    return Draws(plant, PANDA).numbers(KEYS)
+
+
+def test_drives_are_drawn_from_their_ranges():
+    (bandwidths, delays, *_), _ = numbers(Plant(bandwidth=(10, 20), command_delay=(2, 4)))
     assert 10 <= bandwidths.min() < 10.1
     assert 19.9 < bandwidths.max() <= 20
     assert abs(bandwidths.mean() - 15) < 0.3
-    assert abs(np.bincount(delays) - [0, 0, *[len(KEYS) / 3] * 3]).max() < 4 * len(KEYS) ** 0.5
+    assert abs(np.bincount(delays.astype(int)) - [0, 0, *[len(KEYS) / 3] * 3]).max() < 4 * len(KEYS) ** 0.5
     assert abs(np.corrcoef(bandwidths, delays)[0, 1]) < 0.1
-    bandwidths, delays = Draws(Plant(bandwidth=7.0, command_delay=3), PANDA).loops(KEYS)
+    (bandwidths, delays, *_), context = numbers(Plant(bandwidth=7.0, command_delay=3))
     assert set(bandwidths) == {7.0}
     assert set(delays) == {3}
+    assert context.shape == (len(KEYS), 0)
+
+
+CONTEXT = ikgym.scenarios.get("learning-context").plant
+
+
+def test_a_context_is_what_was_drawn_from_ranges():
+    """Each of them independently, from end to end."""
+    drawn, context = numbers(CONTEXT.replace(from_middle=(0.0, 1.0)))
+    assert CONTEXT.context == drawn._fields
+    for name, values, part in zip(drawn._fields, drawn, context.T, strict=True):
+        low, high = getattr(CONTEXT, name)
+        np.testing.assert_allclose(values, low + 0.5 * (part + 1.0) * (high - low), atol=1e-12)
+        assert min(values) <= low + 0.01 * (high - low)
+        assert max(values) >= high - 0.01 * (high - low)
+        assert -1.0 <= part.min() <= part.max() <= 1.0
+        assert abs(part.mean()) < 0.06
+    assert set(drawn.pose_every) == {1, 2, 3, 4}
+    assert abs(np.corrcoef(context.T) - np.eye(7)).max() < 0.1
+
+
+def test_the_splits_of_a_context_meet_nowhere():
+    """The inner half of each range is for training, and what is beyond for extrapolation; nothing else differs."""
+    beyond = ikgym.scenarios.get("learning-context-beyond")
+    assert CONTEXT.from_middle == (0.0, 0.5)
+    assert beyond.plant == CONTEXT.replace(from_middle=(0.5, 1.0))
+    fields = {"name": "learning-context", "plant": CONTEXT}
+    assert fingerprint(beyond.replace(**fields)) == fingerprint(ikgym.scenarios.get("learning-context"))
+    inner, outer = (abs(numbers(plant)[1]) for plant in (CONTEXT, beyond.plant))
+    assert inner.max() <= 0.5 <= outer.min()
+    continuous = [0, 2, 3, 4, 5]
+    assert (inner.max(axis=0)[continuous] > 0.49).all()
+    assert (outer.max(axis=0) > 0.99).all()
+    assert (outer.min(axis=0)[continuous] < 0.51).all()
+
+
+def test_calibration_and_load_are_factors():
+    plant = Plant(zero=0.01, link=0.01, axis=0.01, payload=0.01)
+    same = plant.replace(calibration=1.0, load=1.0)
+    double = Plant(zero=0.02, link=0.02, axis=0.02, payload=0.03)
+    drawn, wanted = (Draws(one, PANDA).one(5) for one in (plant.replace(calibration=2.0, load=3.0), double))
+    assert identical(Draws(same, PANDA).one(5).loaded_arm.chain, Draws(plant, PANDA).one(5).loaded_arm.chain)
+    assert drawn.payload == wanted.payload == 0.03
+    for got, other in zip(drawn.loaded_arm.chain, wanted.loaded_arm.chain, strict=True):
+        np.testing.assert_allclose(got, other, atol=1e-15)
+    ranged = plant.replace(calibration=(0, 2), load=(1, 5))
+    one = Draws(ranged, PANDA).one(5)
+    factor, load = 1.0 + one.context[0], 3.0 + 2.0 * one.context[1]
+    fixed = Draws(plant.replace(calibration=factor, load=load), PANDA).one(5)
+    for got, other in zip(one.loaded_arm.chain, fixed.loaded_arm.chain, strict=True):
+        np.testing.assert_allclose(got, other, atol=1e-15)
+    home = np.full(7, 0.1)
+    assert ranged.reach(PANDA, home) == plant.replace(calibration=2.0, load=5.0).reach(PANDA, home)
+    assert ranged.reach(PANDA, home) > plant.reach(PANDA, home)
 
 
 def test_switching_one_effect_on_shifts_no_other():

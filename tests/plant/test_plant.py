@@ -34,7 +34,10 @@ def test_each_effect_switches_the_plant_on():
     assert Plant().ideal
     assert Plant(payload_step=5).ideal
     assert repr(Plant()) == "Plant()"
-    assert {*ON, "payload_step"} == {field.name for field in dataclasses.fields(Plant)}
+    assert Plant(calibration=2.0, load=(1, 3)).ideal
+    assert {*ON, "payload_step", "calibration", "load", "from_middle"} == {
+        field.name for field in dataclasses.fields(Plant)
+    }
     digests = {fingerprint(SCENARIO)}
     for name, value in ON.items():
         plant = Plant(**{name: value})
@@ -56,5 +59,8 @@ def test_what_is_drawn_is_random():
     }
     assert Plant(bandwidth=(10, 20)).draws_arm
     assert Plant(command_delay=(1, 2)).draws_arm
+    assert Plant(pose_every=(1, 2)).draws_arm
+    assert Plant(pose_every=(1, 2)).late
+    assert Plant(pose_noise=(0, 1e-3)).noisy
     assert not Plant(command_delay=(2, 2), bandwidth=(3.0, 3.0)).random
     assert Plant(arms=2 * ON["arms"]).draws_arm

@@ -28,4 +28,6 @@ def test_single_numbers_and_one_a_joint():
     half = plant.scaled(0.5)
     assert (half.zero, half.backlash, half.bias) == ((5e-4, 1e-3), 2e-4, -5e-4)
     assert (half.command_delay, half.bandwidth, half.q_delay, half.pose_delay) == (2, 20.0, 2, 2)
+    ranged = Plant(pose_noise=(0, 2e-3), pose_every=(1, 5), calibration=(0, 2)).scaled(0.5)
+    assert (ranged.pose_noise, ranged.pose_every, ranged.calibration) == ((0.0, 1e-3), (1, 3), (0.0, 2.0))
     assert Plant(noise=1e-3).scaled(0.5).bandwidth == math.inf

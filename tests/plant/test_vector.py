@@ -25,9 +25,12 @@ def actions(rng, share=1.1):
     return rng.uniform(-share, share, (N, 7)).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", PLANTS)
-def test_single_synchronous_and_native_agree(name):
-    native, sync = pair(panda(PLANTS[name], steps=7))
+SAME, NEXT = AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP
+
+
+@pytest.mark.parametrize(("name", "mode"), [*((name, SAME) for name in PLANTS), ("context", NEXT)])
+def test_single_synchronous_and_native_agree(name, mode):
+    native, sync = pair(panda(PLANTS[name], steps=7), mode=mode)
     assert native.observation_space == sync.observation_space
     assert identical(native.reset(seed=11), sync.reset(seed=11))
     rng = np.random.default_rng(1)

@@ -100,4 +100,4 @@ class Told(NamedWrapper):
         """Offset of the joint zeros by the payload at the end of the step, in [rad] or [m]. Shape (B, n)."""
         plant = self.scenario.plant
         after = self.scenario.steps - batch.remaining + 1.0
-        return np.where(after >= plant.payload_step, np.broadcast_to(plant.payload, batch.q.shape[1]), 0.0)
+        return np.where(after >= plant.payload_step, np.broadcast_to(self.drawn.payload, batch.q.shape[1]), 0.0)

@@ -6,6 +6,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
+from baselines.oracle.stripped import stripped
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 
@@ -45,6 +46,16 @@ def test_a_payload_is_known_once_it_is_there():
     assert episode.position_error[58] < 1e-5
     assert episode.position_error[59:62].max() > 1e-4
     assert episode.position_error[-1] < 1e-5
+
+
+def test_the_payload_of_a_context_is_the_one_that_was_drawn():
+    """Also for the oracle, which plays without drives and sensors."""
+    plant = Plant(payload=1e-3, payload_step=60, load=(1.0, 3.0))
+    drawn = PLAIN.replace(plant=plant).drawn_plant(SEED)
+    same = Plant(payload=1e-3 * (2.0 + drawn.context[0]), payload_step=60)
+    assert drawn.payload == pytest.approx(same.payload, rel=1e-12)
+    assert told(plant)[0] == pytest.approx(told(same)[0], rel=1e-6)
+    assert stripped(PLAIN.replace(plant=plant), SEED).plant == Plant(payload=drawn.payload, payload_step=60)
 
 
 def test_delay_and_lag_are_known():

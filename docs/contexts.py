@@ -1,0 +1,209 @@
+"""Policies and learners on plants that each episode draws anew, the rows of `results/contexts.csv`.
+
+``python -m docs.measure contexts`` measures them; ``python -m docs.contexts --minutes 10 --seeds 0 1 2`` trains the
+learners first, into ``runs/context-NAME/seed-N``. A learner that was not trained here keeps its row.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+import ikgym
+from baselines.evaluate import evaluate
+from baselines.evaluation.metrics import lost
+from baselines.evaluation.records import from_csv
+from baselines.evaluation.summary import geometric_interval, geometric_mean
+from baselines.files import write_json
+from ikgym.rl import Task
+from ikgym.validation import BoolArray, FloatArray
+
+RESULTS, RUNS = Path(__file__).parent / "results" / "contexts.csv", Path("runs")
+#: What was measured lies here until the end.
+WORK = Path("results") / "measure"
+#: Scenario and seeds of each split, and its episodes.
+SPLITS = {
+    "train": ("learning-context", "train"),
+    "interpolation": ("learning-context", "test"),
+    "extrapolation": ("learning-context-beyond", "test"),
+}
+EPISODES = 128
+#: Steps after which nothing but time ends a training.
+FOREVER = 10**12
+
+#: The ranges of the drives, and what is known of the arm before anything is measured: the middle of each range.
+DRIVES = {"delay": 1, "bandwidth": 10.0, "longest_delay": 3, "lowest_bandwidth": 4.0, "gain": 0.2}
+PRIOR = {"zero": 5e-3, "link": 1e-3, "axis": 2.5e-3, "start": 1e-5}
+RHC = {"policy": "rhc", "options": {"horizon": 8, "iterations": 3}}
+AROUND = {"policy": "predicted", "options": {**RHC, **DRIVES}}
+TOLD, ADAPTIVE = "told", ("filter_bank", "calibrated", "offset_free")
+#: Policies by their labels, with settings from validation episodes.
+POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
+    TOLD: (TOLD, RHC),
+    "filter_bank": ("filter_bank", {**AROUND, **PRIOR, "alike": 2e-3}),
+    "calibrated": ("calibrated", {**AROUND, **PRIOR, "pose_noise": 1e-3, "pose_rotation_noise": 1e-3, "walk": 1e-3}),
+    "offset_free": ("offset_free", {**AROUND, "gain": 0.2}),
+    "predicted": ("predicted", {"policy": "dls", "options": {"gain": 0.13}, **DRIVES}),
+    "qp": ("qp", {"gain": 0.3}),
+    "dls": ("dls", {"gain": 0.15}),
+}
+#: Learners by their names: the class, the network, and what is observed.
+USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
+LEARNERS = {
+    "ppo_shown": ("PPO", "MlpPolicy", USUAL.replace(context=True)),
+    "ppo_history": ("PPO", "MlpPolicy", USUAL.replace(history=4)),
+    "ppo_recurrent": ("RecurrentPPO", "MlpLstmPolicy", USUAL),
+}
+SETTINGS: dict[str, Any] = {
+    "gamma": 0.95,
+    "learning_rate": 1e-3,
+    "n_steps": 64,
+    "batch_size": 128,
+    "n_epochs": 5,
+    "policy_kwargs": {"log_std_init": -1.5},
+}
+
+#: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
+Played = Mapping[str, tuple[FloatArray, BoolArray]]
+Line = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """Trains learners where each episode draws its plant."""
+
+    learners: Annotated[tuple[str, ...], tyro.conf.Positional] = tuple(LEARNERS)
+    """Names: ppo_shown, ppo_history, ppo_recurrent (of sb3-contrib)."""
+    minutes: float = 10.0
+    """CPU time of each training."""
+    seeds: tuple[int, ...] = (0,)
+    """One training each."""
+
+
+def measured(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
+    """The table: costs relative to the policy that is told the plant, and the share of the gap to it that is closed."""
+    old = {line["policy"]: line for line in from_csv(RESULTS.read_text(encoding="utf-8"))} if RESULTS.exists() else {}
+    if only_times:
+        return list(map(dict, old.values()))
+    told, out = _solver(TOLD), []
+    for name in POLICIES:
+        known = old[name] if only_new and name in old else None
+        out.append(known or _line(name, told if name == TOLD else _solver(name), told))
+    for name in LEARNERS:
+        if files := sorted((RUNS / f"context-{name}").glob("seed-*/model.zip")):
+            out.append(_line(name, _learner(name, files), told) | {"minutes": _minutes(files)})
+        elif name in old:
+            out.append(old[name])
+    best = min(float(line["interpolation"]) for line in out if line["policy"] in ADAPTIVE)
+    gap = {line["policy"]: 1.0 - np.log(float(line["interpolation"])) / np.log(best) for line in out}
+    return [{**line, "gap_closed": float(gap[line["policy"]])} for line in out]
+
+
+def _line(policy: str, played: Played, told: Played) -> Line:
+    """A line of the table, whose last two columns are set when all lines are there."""
+    line: Line = {"policy": policy, "seeds": len(played["train"][0]), "episodes": EPISODES, "minutes": None}
+    for split, (costs, _) in played.items():
+        ratios = costs / told[split][0]
+        line[split] = geometric_mean(ratios)
+        line[f"{split}_low"], line[f"{split}_high"] = geometric_interval(ratios)
+    return line | {"lost_percent": 100.0 * float(np.mean([away for _, away in played.values()])), "gap_closed": None}
+
+
+def _solver(name: str) -> Played:
+    """A policy on the first episodes of each split."""
+    out = {}
+    for split, (scenario, seeds) in SPLITS.items():
+        kept: dict[str, Any] = {"out": WORK / f"contexts-{split}-{name}", "resume": True, "report": False}
+        rows = evaluate(scenario, [POLICIES[name]], split=seeds, episodes=EPISODES, progress=True, **kept)
+        out[split] = np.array([[row.total_cost for row in rows]]), np.array([[row.lost for row in rows]])
+    return out
+
+
+def _learner(name: str, files: Sequence[Path]) -> Played:
+    """The models of a learner on the first episodes of each split."""
+    kind, _, task = LEARNERS[name]
+    models, out = [_kind(kind).load(file, device="cpu") for file in files], {}
+    for split, (scenario, seeds) in SPLITS.items():
+        found = [play(model, task, scenario, ikgym.scenarios.seeds(seeds, EPISODES)) for model in models]
+        out[split] = np.array([costs for costs, _ in found]), np.array([away for _, away in found])
+    return out
+
+
+def play(model: Any, task: Task, scenario: str, seeds: Sequence[int]) -> tuple[FloatArray, BoolArray]:
+    """Plays whole episodes with a model of Stable-Baselines3.
+
+    Returns:
+        The benchmark's costs, and whether arms were lost. Shapes (e,).
+    """
+    envs = task.replace(scenario=scenario, lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
+    observation, _ = envs.reset(seed=list(seeds))
+    state, begun, costs, worst = None, np.ones(len(seeds), dtype=np.bool_), np.zeros(len(seeds)), np.zeros((2, 1))
+    for _ in range(envs.scenario.steps):
+        action, state = model.predict(observation, state=state, episode_start=begun, deterministic=True)
+        observation, *_, infos = envs.step(action)
+        costs += infos["tracking_cost"] + infos["velocity_cost"]
+        worst = np.maximum(worst, [infos["position_error"], infos["orientation_error"]])
+        begun[:] = False
+    return costs, np.array([lost(*one) for one in worst.T])
+
+
+def train(name: str, seed: int, minutes: float) -> None:
+    """Trains a learner, unless it is there, and writes `model.zip` and `run.json`."""
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    from ikgym.sb3 import LearningVecEnv
+
+    class Clock(BaseCallback):
+        """Stops when the CPU time is over."""
+
+        def _on_step(self) -> bool:
+            return time.process_time() < end
+
+    folder = RUNS / f"context-{name}" / f"seed-{seed}"
+    if (folder / "model.zip").exists():
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+    kind, network, task = LEARNERS[name]
+    envs = LearningVecEnv(8, task)
+    model = _kind(kind)(network, envs, seed=seed, device="cpu", **SETTINGS)
+    end = time.process_time() + 60.0 * minutes
+    model.learn(FOREVER, callback=Clock())
+    model.save(folder / "model.zip")
+    write_json(folder / "run.json", {"minutes": minutes, "steps": model.num_timesteps, "settings": SETTINGS})
+    print(f"{name}, seed {seed}: {model.num_timesteps} steps", flush=True)
+
+
+def _kind(name: str) -> Any:
+    import stable_baselines3
+
+    if hasattr(stable_baselines3, name):
+        return getattr(stable_baselines3, name)
+    import sb3_contrib
+
+    return getattr(sb3_contrib, name)
+
+
+def _minutes(files: Sequence[Path]) -> float:
+    """CPU minutes of a training, the mean over its seeds."""
+    found = [json.loads(file.with_name("run.json").read_text(encoding="utf-8"))["minutes"] for file in files]
+    return float(np.mean(found))
+
+
+def main(command: Command) -> None:
+    """Trains all learners that are asked for."""
+    for seed in command.seeds:
+        for name in command.learners:
+            train(name, seed, command.minutes)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Command))
