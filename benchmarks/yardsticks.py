@@ -101,7 +101,7 @@ def measured(name: str, split: str, dls: str) -> dict[str, float]:
 def threshold(name: str, dls: str, own: Mapping[str, float]) -> float:
     """The mean return of `dls` in an environment with the damping that takes its score down to 0.8."""
     task, seeds, points = rl.IDS[name].task, scenarios.seeds("validation", EPISODES), []
-    scenario, (solver, parameters) = scenarios.get(task.scenario), parse_policy(dls)
+    scenario, (solver, parameters) = scenarios.find(task.scenario), parse_policy(dls)
     for damping in DAMPED:
         policy = baselines.make(solver, scenario, **{**parameters, "damping": damping})
         episodes = rollouts(scenario, policy, seeds)
