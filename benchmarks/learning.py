@@ -38,7 +38,7 @@ RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("envir
 #: Episodes of the split `test`.
 EPISODES = 256
 #: CPU time of a run with the defaults of the library, which know no number of steps, in [min].
-MINUTES = 10.0
+MINUTES = 4.0
 Line = dict[str, Any]
 
 
@@ -105,8 +105,12 @@ def table(lines: Sequence[Line]) -> list[Line]:
 
 def picture(lines: Sequence[Line]) -> Figure:
     """Validation scores over core-minutes, a panel for each environment, a line for each seed."""
-    drawn = style.figure(6.0)
-    panels = dict(zip(rl.IDS, drawn.subplots(2, 3, sharey=True).flat, strict=True))
+    here = [env for env in rl.IDS if any(line["environment"] == env for line in lines)]
+    columns = min(3, len(here))
+    drawn = style.figure(3.0 * -(-len(here) // columns))
+    panels = dict(
+        zip(here, drawn.subplots(-(-len(here) // columns), columns, sharey=True, squeeze=False).flat, strict=False)
+    )
     handles: Line = {}
     for (env, algorithm, kind), found in sorted(_groups(lines).items()):
         look = {**style.looks(list(ALGORITHMS).index(algorithm)), "lw": 0.8}

@@ -208,7 +208,7 @@ class AgentTrack(AgentAlone):
         InvalidInputError: The file has another hash, or the scenario does not fit the agent.
     """
 
-    hash: str = "HASH"
+    hash: str = "93c87248eb01"
 
     name: ClassVar[str] = "agent_track"
 

@@ -178,7 +178,7 @@ def test_the_agent_of_an_environment_by_id_follows_another_panda():
     policy = baselines.make("agent_track", "panda-random")
     assert policy.file.about["training"]["env"] == "ikgym/Track-v0"
     assert policy.preview == (5, 25)
-    [row] = evaluate("panda-random", "agent_track", episodes=1)
-    assert 1e-4 < row.position_error_rms < 3e-3
+    rows = evaluate("panda-random", "agent_track", episodes=4)
+    assert 1e-4 < np.median([row.position_error_rms for row in rows]) < 3e-3
     with pytest.raises(InvalidInputError, match="was trained for the arm panda-velocity"):
         baselines.make("agent_track", "varga7-pose-random")
