@@ -1,13 +1,15 @@
 """Policies and learners on plants that each episode draws anew, the rows of `results/contexts.csv`.
 
-``python -m docs.measure contexts`` measures them; ``python -m docs.contexts --minutes 10 --seeds 0 1 2`` trains the
-learners first, into ``runs/context-NAME/seed-N``. A learner that was not trained here keeps its row.
+``python -m docs.measure contexts`` measures them; ``python -m docs.contexts --seeds 0 1 2`` trains the learners first,
+into ``runs/context-NAME/seed-N``. A learner that was not trained here keeps its row.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
+import operator
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,8 +37,6 @@ SPLITS = {
     "extrapolation": ("learning-context-beyond", "test"),
 }
 EPISODES = 128
-#: Steps after which nothing but time ends a training.
-FOREVER = 10**12
 
 #: The ranges of the drives, and what is known of the arm before anything is measured: the middle of each range.
 DRIVES = {"delay": 1, "bandwidth": 10.0, "longest_delay": 3, "lowest_bandwidth": 4.0, "gain": 0.2}
@@ -61,14 +61,15 @@ LEARNERS = {
     "ppo_history": ("PPO", "MlpPolicy", USUAL.replace(history=4)),
     "ppo_recurrent": ("RecurrentPPO", "MlpLstmPolicy", USUAL),
 }
+#: As published for PPO in the environments by id; the learning rate falls linearly.
 SETTINGS: dict[str, Any] = {
     "gamma": 0.95,
-    "learning_rate": 1e-3,
-    "n_steps": 64,
-    "batch_size": 128,
+    "n_steps": 32,
+    "batch_size": 512,
     "n_epochs": 5,
-    "policy_kwargs": {"log_std_init": -1.5},
+    "policy_kwargs": {"log_std_init": -1.5, "net_arch": [256, 256]},
 }
+ARMS, RATE = 64, 1e-3
 
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
@@ -81,8 +82,8 @@ class Command:
 
     learners: Annotated[tuple[str, ...], tyro.conf.Positional] = tuple(LEARNERS)
     """Names: ppo_shown, ppo_history, ppo_recurrent (of sb3-contrib)."""
-    minutes: float = 10.0
-    """CPU time of each training."""
+    steps: int = 1_000_000
+    """Steps of each training, of all arms together."""
     seeds: tuple[int, ...] = (0,)
     """One training each."""
 
@@ -154,18 +155,11 @@ def play(model: Any, task: Task, scenario: str, seeds: Sequence[int]) -> tuple[F
     return costs, np.array([lost(*one) for one in worst.T])
 
 
-def train(name: str, seed: int, minutes: float) -> None:
+def train(name: str, seed: int, steps: int) -> None:
     """Trains a learner, unless it is there, and writes `model.zip` and `run.json`."""
     import torch
-    from stable_baselines3.common.callbacks import BaseCallback
 
     from ikgym.sb3 import LearningVecEnv
-
-    class Clock(BaseCallback):
-        """Stops when the CPU time is over."""
-
-        def _on_step(self) -> bool:
-            return time.process_time() < end
 
     folder = RUNS / f"context-{name}" / f"seed-{seed}"
     if (folder / "model.zip").exists():
@@ -173,13 +167,15 @@ def train(name: str, seed: int, minutes: float) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     kind, network, task = LEARNERS[name]
-    envs = LearningVecEnv(8, task)
-    model = _kind(kind)(network, envs, seed=seed, device="cpu", **SETTINGS)
-    end = time.process_time() + 60.0 * minutes
-    model.learn(FOREVER, callback=Clock())
+    rate = functools.partial(operator.mul, RATE)  # of the share of steps that remains
+    settings = {**SETTINGS, "policy_kwargs": {**SETTINGS["policy_kwargs"], "activation_fn": torch.nn.ReLU}}
+    model = _kind(kind)(network, LearningVecEnv(ARMS, task), seed=seed, device="cpu", learning_rate=rate, **settings)
+    begin = time.process_time()
+    model.learn(steps)
+    minutes = round((time.process_time() - begin) / 60.0, 1)
     model.save(folder / "model.zip")
     write_json(folder / "run.json", {"minutes": minutes, "steps": model.num_timesteps, "settings": SETTINGS})
-    print(f"{name}, seed {seed}: {model.num_timesteps} steps", flush=True)
+    print(f"{name}, seed {seed}: {model.num_timesteps} steps in {minutes} min", flush=True)
 
 
 def _kind(name: str) -> Any:
@@ -202,7 +198,7 @@ def main(command: Command) -> None:
     """Trains all learners that are asked for."""
     for seed in command.seeds:
         for name in command.learners:
-            train(name, seed, command.minutes)
+            train(name, seed, command.steps)
 
 
 if __name__ == "__main__":

@@ -44,11 +44,11 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(contexts, "WORK", tmp_path / "measure")
     monkeypatch.setattr(contexts, "EPISODES", 2)
     monkeypatch.setattr(contexts, "RESULTS", tmp_path / "contexts.csv")
-    contexts.train("ppo_shown", 0, 0.001)
+    contexts.train("ppo_shown", 0, 2048)
     model = tmp_path / "context-ppo_shown" / "seed-0" / "model.zip"
     assert PPO.load(model).observation_space.shape == (75,)
     written = model.read_bytes()
-    contexts.train("ppo_shown", 0, 0.001)
+    contexts.train("ppo_shown", 0, 2048)
     assert model.read_bytes() == written
     (tmp_path / "contexts.csv").write_text("policy,interpolation\nppo_history,7\nfilter_bank,4\n", encoding="utf-8")
     lines = {line["policy"]: line for line in contexts.measured(only_new=True)}
@@ -59,14 +59,14 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     best = min(float(lines[name]["interpolation"]) for name in contexts.ADAPTIVE)
     assert shown["gap_closed"] == pytest.approx(1 - np.log(shown["interpolation"]) / np.log(best))
     assert shown["gap_closed"] < 0.0
-    assert shown["minutes"] == json.loads(model.with_name("run.json").read_text())["minutes"] == 0.001
+    assert shown["minutes"] == json.loads(model.with_name("run.json").read_text())["minutes"] <= 1.0
     assert [line["interpolation"] for line in contexts.measured(only_times=True)] == ["7", "4"]
 
 
 def test_recurrent_learners_remember(tmp_path, monkeypatch):
     pytest.importorskip("sb3_contrib")
     monkeypatch.setattr(contexts, "RUNS", tmp_path)
-    contexts.train("ppo_recurrent", 0, 0.001)
+    contexts.train("ppo_recurrent", 0, 2048)
     model = contexts._kind("RecurrentPPO").load(tmp_path / "context-ppo_recurrent" / "seed-0" / "model.zip")
     costs, _ = contexts.play(model, contexts.LEARNERS["ppo_recurrent"][2], "learning-context", SEEDS)
     assert np.isfinite(costs).all()
