@@ -24,6 +24,7 @@ def test_the_table_is_that_of_the_curves():
 
 @pytest.mark.parametrize(("env", "algorithm", "least"), [
     ("ikgym/Track-v0", "ppo", 0.5), ("ikgym/Track-v0", "sac", 0.5), ("ikgym/Track-v0", "td3", 0.5),
+    *((env, algorithm, 0.3) for env in ("ikgym/Fast-v0", "ikgym/Limits-v0") for algorithm in ("ppo", "sac")),
     ("ikgym/Reach-v0", "ppo", 0.5), ("ikgym/Reach-v0", "sac", 0.5), ("ikgym/Reach-v0", "td3", 0.3),
 ])  # fmt: skip
 def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
