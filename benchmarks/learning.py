@@ -106,11 +106,13 @@ def table(lines: Sequence[Line]) -> list[Line]:
 def picture(lines: Sequence[Line]) -> Figure:
     """Validation scores over core-minutes, a panel for each environment, a line for each seed."""
     here = [env for env in rl.IDS if any(line["environment"] == env for line in lines)]
-    columns = min(3, len(here))
-    drawn = style.figure(3.0 * -(-len(here) // columns))
-    panels = dict(
-        zip(here, drawn.subplots(-(-len(here) // columns), columns, sharey=True, squeeze=False).flat, strict=False)
-    )
+    columns = 2 if len(here) == 4 else min(3, len(here))
+    high = -(-len(here) // columns)
+    drawn = style.figure(3.0 * high)
+    every = drawn.subplots(high, columns, sharey=True, squeeze=False).ravel()
+    panels = dict(zip(here, every, strict=False))
+    for axes in every[len(here) :]:
+        axes.remove()
     handles: Line = {}
     for (env, algorithm, kind), found in sorted(_groups(lines).items()):
         look = {**style.looks(list(ALGORITHMS).index(algorithm)), "lw": 0.8}
@@ -123,6 +125,7 @@ def picture(lines: Sequence[Line]) -> Figure:
     for env, axes in panels.items():
         style.dress(axes, title=env, xlabel="core-minutes", ylabel="score", ticks=4)
         axes.set_ylim(-0.2, 1.05)
+        axes.set_xlim(left=0.0)
     style.legend(drawn, "Validation score, a line for each training seed", list(handles.values()), list(handles))
     return drawn
 
