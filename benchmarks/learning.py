@@ -120,7 +120,7 @@ def picture(lines: Sequence[Line]) -> Figure:
         for _, seed in itertools.groupby(found, lambda line: line["seed"]):
             rows = list(seed)
             minutes = [float(row["core_seconds"]) / 60.0 for row in rows]
-            shade = {"alpha": 0.4, "ls": ":"} if kind == "defaults" else {}
+            shade = {"alpha": 0.5, "linestyle": ":"} if kind == "defaults" else {}
             (handles[label],) = panels[env].plot(minutes, [float(row["score"]) for row in rows], **look | shade)
     for env, axes in panels.items():
         style.dress(axes, title=env, xlabel="core-minutes", ylabel="score", ticks=4)
