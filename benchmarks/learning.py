@@ -26,13 +26,12 @@ from matplotlib.figure import Figure
 from baselines.evaluation.plots import style
 from baselines.evaluation.records import from_csv, to_csv
 from baselines.files import write
-from baselines.training.config import PPO, SAC, TD3, Rewards
+from baselines.training.methods import BY_REWARDS
 from baselines.training.rewards import ALGORITHMS, Training, read
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
 CURVES, TABLE, PICTURE = DOCS / "results/learning_runs.csv", DOCS / "results/learning.csv", DOCS / "images/learning.png"
-CONFIGS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3)}
 #: What one training is known by, and what a line of the table is about.
 RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("environment", "algorithm", "settings")
 #: Episodes of the split `test`.
@@ -64,7 +63,7 @@ class Command:
         minutes, out = MINUTES if self.defaults else None, []
         for seed, env, algorithm in itertools.product(self.seeds, self.environments, self.algorithms):
             folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
-            out.append(Training(CONFIGS[algorithm](env=env, minutes=minutes, defaults=self.defaults), seed, folder))
+            out.append(Training(BY_REWARDS[algorithm](env=env, minutes=minutes, defaults=self.defaults), seed, folder))
         return out
 
 

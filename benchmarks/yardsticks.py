@@ -20,6 +20,8 @@ from baselines.episodes import Episode, rollout, rollouts
 from baselines.spec import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import FILE
+from ikgym.rl.track import UNIT
+from ikgym.rl.track_kernels import distance_rewards
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -60,11 +62,11 @@ def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
 
 def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:
     """Sums of the rewards of whole episodes, see :class:`ikgym.rl.DistanceReward`. Shape (episodes,)."""
-    costs = [
-        1e6 * (one.position_error**2 + (task.radian * one.orientation_error) ** 2) + one.velocity_cost
-        for one in episodes
-    ]
-    total: FloatArray = (1.0 - np.log1p(costs) / np.log1p(1e6 * task.zero**2)).sum(axis=1)
+    out = np.empty((len(episodes), len(episodes[0].position_error)))
+    for one, rewards in zip(episodes, out, strict=True):
+        scales = task.radian, UNIT, task.zero
+        distance_rewards(scales, one.position_error, one.orientation_error, one.velocity_cost, rewards)
+    total: FloatArray = out.sum(axis=1)
     return total
 
 

@@ -7,9 +7,7 @@ into ``runs/context-NAME/seed-N``. A learner that was not trained here keeps its
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
-import operator
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +22,8 @@ from baselines.evaluation.metrics import lost
 from baselines.evaluation.records import from_csv
 from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write_json
-from ikgym.rl import Task
+from baselines.training.config import PPO
+from ikgym.rl import Task, scoring
 from ikgym.validation import BoolArray, FloatArray
 
 RESULTS, RUNS = Path(__file__).parent / "results" / "contexts.csv", Path("runs")
@@ -61,16 +60,6 @@ LEARNERS = {
     "ppo_history": ("PPO", "MlpPolicy", USUAL.replace(history=4)),
     "ppo_recurrent": ("RecurrentPPO", "MlpLstmPolicy", USUAL),
 }
-#: As published for PPO in the environments by id; the learning rate falls linearly.
-SETTINGS: dict[str, Any] = {
-    "gamma": 0.95,
-    "n_steps": 32,
-    "batch_size": 512,
-    "n_epochs": 5,
-    "policy_kwargs": {"log_std_init": -1.5, "net_arch": [256, 256]},
-}
-ARMS, RATE = 64, 1e-3
-
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
 Line = dict[str, Any]
@@ -143,15 +132,10 @@ def play(model: Any, task: Task, scenario: str, seeds: Sequence[int]) -> tuple[F
     Returns:
         The benchmark's costs, and whether arms were lost. Shapes (e,).
     """
-    envs = task.replace(scenario=scenario, lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
-    observation, _ = envs.reset(seed=list(seeds))
-    state, begun, costs, worst = None, np.ones(len(seeds), dtype=np.bool_), np.zeros(len(seeds)), np.zeros((2, 1))
-    for _ in range(envs.scenario.steps):
-        action, state = model.predict(observation, state=state, episode_start=begun, deterministic=True)
-        observation, *_, infos = envs.step(action)
+    costs, worst = np.zeros(len(seeds)), np.zeros((2, 1))
+    for infos in scoring.play(model, task.replace(scenario=scenario), seeds):
         costs += infos["tracking_cost"] + infos["velocity_cost"]
         worst = np.maximum(worst, [infos["position_error"], infos["orientation_error"]])
-        begun[:] = False
     return costs, np.array([lost(*one) for one in worst.T])
 
 
@@ -159,6 +143,7 @@ def train(name: str, seed: int, steps: int) -> None:
     """Trains a learner, unless it is there, and writes `model.zip` and `run.json`."""
     import torch
 
+    from baselines.training import rewards
     from ikgym.sb3 import LearningVecEnv
 
     folder = RUNS / f"context-{name}" / f"seed-{seed}"
@@ -167,14 +152,13 @@ def train(name: str, seed: int, steps: int) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     kind, network, task = LEARNERS[name]
-    rate = functools.partial(operator.mul, RATE)  # of the share of steps that remains
-    settings = {**SETTINGS, "policy_kwargs": {**SETTINGS["policy_kwargs"], "activation_fn": torch.nn.ReLU}}
-    model = _kind(kind)(network, LearningVecEnv(ARMS, task), seed=seed, device="cpu", learning_rate=rate, **settings)
+    settings = {**rewards.read(PPO(env="ikgym/Track-v0")), "policy": network}
+    model = rewards.built(_kind(kind), LearningVecEnv(settings["n_envs"], task), settings, seed)
     begin = time.process_time()
     model.learn(steps)
     minutes = round((time.process_time() - begin) / 60.0, 1)
     model.save(folder / "model.zip")
-    write_json(folder / "run.json", {"minutes": minutes, "steps": model.num_timesteps, "settings": SETTINGS})
+    write_json(folder / "run.json", {"minutes": minutes, "steps": model.num_timesteps, "settings": settings})
     print(f"{name}, seed {seed}: {model.num_timesteps} steps in {minutes} min", flush=True)
 
 

@@ -34,7 +34,6 @@ from baselines.evaluation.records import from_csv, records, to_csv
 from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write
 from baselines.oracle import best_known
-from baselines.training.config import Rewards
 from docs import contexts
 
 RESULTS = Path(__file__).parent / "results"
@@ -138,22 +137,24 @@ def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> l
 def untrained() -> None:
     """Writes agents as they are before their training: of apg, and of PPO and SAC in `ikgym/Track-v0`."""
     from baselines.training import rewards
-    from baselines.training.config import PPO, SAC
     from baselines.training.exporting import exported
-    from baselines.training.methods import configure
+    from baselines.training.methods import BY_REWARDS, configure
     from baselines.training.trainer import Trainer
 
-    apg = configure("standard")
+    def by_rewards(method: str, seed: int) -> AgentFile:
+        config = BY_REWARDS[method](env="ikgym/Track-v0")
+        model: Any = rewards.make(config, rewards.read(config), seed)
+        return exported(model, model.get_env())
+
+    def by_gradients(seed: int) -> AgentFile:
+        config = configure("standard")
+        return Trainer(config, config.make_scenario(), seed).agent()
+
     makers: dict[str, Callable[[int], AgentFile]] = {
-        UNTRAINED: lambda seed: Trainer(apg, apg.make_scenario(), seed).agent()
+        UNTRAINED: by_gradients,
+        f"{UNTRAINED}-ppo": functools.partial(by_rewards, "ppo"),
+        f"{UNTRAINED}-sac": functools.partial(by_rewards, "sac"),
     }
-    for config in (PPO(env="ikgym/Track-v0"), SAC(env="ikgym/Track-v0")):
-
-        def made(seed: int, config: Rewards = config) -> AgentFile:
-            model: Any = rewards.make(config, rewards.read(config), seed)
-            return exported(model, model.get_env())
-
-        makers[f"{UNTRAINED}-{config.method}"] = made
     for (name, make), seed in itertools.product(makers.items(), SEEDS):
         file = RUNS / name / f"seed-{seed}" / "agent.safetensors"
         if not file.exists():

@@ -14,7 +14,7 @@ PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
 def test_curves_are_of_the_published_settings(tmp_path):
     runs = {tuple(line[name] for name in learning.RUN) for line in PUBLISHED}
     for env, algorithm, _, _, seed in runs:
-        training = Training(learning.CONFIGS[algorithm](env=env), int(seed), tmp_path)
+        training = Training(learning.BY_REWARDS[algorithm](env=env), int(seed), tmp_path)
         assert tuple(learning.about(training).values()) in runs
 
 
@@ -37,7 +37,7 @@ def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
 def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
     small = tmp_path / "curves.csv"
     monkeypatch.setattr(learning, "EPISODES", 2)
-    training = Training(learning.CONFIGS["ppo"](env="ikgym/Track-v0", total_timesteps=2048, episodes=2), 0, tmp_path)
+    training = Training(learning.BY_REWARDS["ppo"](env="ikgym/Track-v0", total_timesteps=2048, episodes=2), 0, tmp_path)
     lines = learning.curve(training)
     small.write_text(to_csv(lines), encoding="utf-8")
     assert from_csv(small.read_text(encoding="utf-8"))[-1]["test_log_cost"]

@@ -9,7 +9,8 @@ from ikgym.exceptions import UnknownNameError
 from ikgym.files import read_user_toml
 
 #: Configurations by the names of their methods; the docstring of each describes the method on the command line.
-METHODS: dict[str, type[APG | Rewards]] = {kind.method: kind for kind in (APG, PPO, SAC, TD3)}
+BY_REWARDS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3)}
+METHODS: dict[str, type[APG | Rewards]] = {APG.method: APG, **BY_REWARDS}
 #: The presets that come with the training, a table each.
 PRESETS = pathlib.Path(__file__).with_name("presets.toml")
 

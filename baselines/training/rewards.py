@@ -28,6 +28,7 @@ from baselines.training.exporting import ACTIVATIONS, export
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_file
+from ikgym.sb3 import LearningVecEnv
 from ikgym.validation import FloatArray, known_name, whole_number
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
@@ -127,16 +128,25 @@ def make(config: Rewards, settings: Mapping[str, Any], seed: int = 0) -> BaseAlg
     Raises:
         InvalidInputError: The algorithm refuses a setting.
     """
-    parameters = {key: _value(key, value) for key, value in settings.items() if key != "n_timesteps"}
-    envs = ikgym.sb3.make_vec(config.env, whole_number("n_envs", parameters.pop("n_envs", 1), at_least=1))
+    envs = ikgym.sb3.make_vec(config.env, whole_number("n_envs", settings.get("n_envs", 1), at_least=1))
+    return built(ALGORITHMS[config.method], envs, settings, seed)
+
+
+def built(kind: type[BaseAlgorithm], envs: LearningVecEnv, settings: Mapping[str, Any], seed: int) -> BaseAlgorithm:
+    """The model of an algorithm in an environment.
+
+    Raises:
+        InvalidInputError: The algorithm refuses a setting.
+    """
+    parameters = {key: _value(key, value) for key, value in settings.items() if key not in ("n_timesteps", "n_envs")}
     if parameters.pop("noise_type", None) is not None:
         joints: FloatArray = np.ones(envs.scenario.joints)
         parameters["action_noise"] = NormalActionNoise(0.0 * joints, parameters.pop("noise_std") * joints)
-    policy, kind = parameters.pop("policy", "MlpPolicy"), ALGORITHMS[config.method]
+    policy = parameters.pop("policy", "MlpPolicy")
     try:
         return kind(policy, envs, seed=seed, device="cpu", **parameters)
     except (AssertionError, TypeError, ValueError) as e:  # Stable-Baselines3's own checks
-        raise InvalidInputError(f"settings: {config.method} refuses {parameters}: {e}") from e
+        raise InvalidInputError(f"settings: {kind.__name__.lower()} refuses {parameters}: {e}") from e
 
 
 class Curve(BaseCallback):
@@ -158,7 +168,7 @@ class Curve(BaseCallback):
         now = time.process_time()
         self.spent, self._since = self.spent + now - self._since, now
         done = max(self.spent / self._seconds, self.num_timesteps / self._steps)
-        if done * self._config.validations >= len(self._rows):
+        if done < 1.0 and done * self._config.validations >= len(self._rows):  # the last one follows the training
             self.validate()
         return self.spent < self._seconds
 

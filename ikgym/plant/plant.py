@@ -194,7 +194,14 @@ class Plant(Frozen):
     def ideal(self) -> bool:
         """Whether all effects are off."""
         driven = self.bandwidth != math.inf or self.longest_command_delay > 0
-        return not (self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS, *DRAWN[2:]))
+        return not (
+            self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS, "pose_noise", "pose_rotation_noise")
+        )
+
+    @property
+    def poses_underway(self) -> int:
+        """The most measurements of the pose that are on their way at once."""
+        return self.pose_delay // int(np.min(self.pose_every)) + 1
 
     @property
     def late(self) -> bool:

@@ -93,7 +93,7 @@ class PlantRows:
             play=np.zeros((rows, n)),
             commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
             q=np.zeros((rows, plant.q_delay + 1, n)),
-            pose=np.zeros((rows, plant.pose_delay // int(np.min(plant.pose_every)) + 1, coordinates)),
+            pose=np.zeros((rows, plant.poses_underway, coordinates)),
             shown=np.zeros((rows, coordinates)),
             shown_step=np.zeros(rows, dtype=np.int64),
         )
@@ -102,12 +102,7 @@ class PlantRows:
     def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
         """Numbers that a row takes."""
         kept = joints * (plant.longest_command_delay + 1 + commands + plant.q_delay + 1)
-        return (
-            2 * (6 * joints + 12)
-            + kept
-            + coordinates * (plant.pose_delay // int(np.min(plant.pose_every)) + 2)
-            + 4 * joints
-        )
+        return 2 * (6 * joints + 12) + kept + coordinates * (plant.poses_underway + 1) + 4 * joints
 
     def begin(
         self,

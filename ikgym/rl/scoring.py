@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.ids import IDS, TaskEnv
+from ikgym.rl.making import Task
 from ikgym.validation import FloatArray, float_array, known_name, known_names, whole_number
 
 #: Costs of the yardsticks, by split and id; ``python -m benchmarks.yardsticks`` measures them.
@@ -56,17 +57,29 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
     kind = environment(name)
     known_name("split", split, scenarios.SPLITS)
     whole_number("episodes", episodes, at_least=1)
-    envs = kind.arms(episodes, autoreset_mode="Disabled", lost_distance=None)
-    observation, _ = envs.reset(seed=scenarios.SPLITS[split].start)
-    steps, state, begun = envs.scenario.steps, None, np.ones(episodes, dtype=np.bool_)
-    first, total = steps - (kind.task.counted or steps), np.zeros(episodes)
-    for step in range(steps):
+    total = np.zeros(episodes)
+    steps = list(play(model, kind.task, scenarios.seeds(split, episodes)))
+    for infos in steps[-(kind.task.counted or 0) :]:
+        total += infos["tracking_cost"] + infos["velocity_cost"]
+    return total
+
+
+def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """The infos of each step of whole episodes, also beyond where training would end them.
+
+    Args:
+        model: Any object with the `predict` of Stable-Baselines3.
+        task: What it sees.
+        seeds: Of the episodes.
+    """
+    envs = task.replace(lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
+    observation, _ = envs.reset(seed=list(seeds))
+    state, begun = None, np.ones(len(seeds), dtype=np.bool_)
+    for _ in range(envs.scenario.steps):
         action, state = model.predict(observation, state=state, episode_start=begun, deterministic=True)
         observation, *_, infos = envs.step(action)
-        begun[:] = False
-        if step >= first:
-            total += infos["tracking_cost"] + infos["velocity_cost"]
-    return total
+        begun = np.zeros_like(begun)
+        yield infos
 
 
 def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str, Score]:

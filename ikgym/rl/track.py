@@ -26,7 +26,7 @@ class TrackStage(Stage):
     """See :class:`ikgym.rl.TrackObservation`."""
 
     def __init__(
-        self, env: Any, radian: float = 1.0, coarse: float = 0.1, fine: float = 0.01, context: bool = False
+        self, env: Any, radian: float = 1.0, coarse: float = 0.03, fine: float = 0.01, context: bool = False
     ) -> None:
         space, scenario = own_space(env), env.unwrapped.scenario
         sizes = {"radian": radian, "coarse": coarse, "fine": fine}

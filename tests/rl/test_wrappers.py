@@ -1,5 +1,6 @@
 """Wrappers for learning: one by one, all of them, and N arms at once, bit for bit."""
 
+import inspect
 import itertools
 import warnings
 
@@ -130,3 +131,9 @@ def test_joints_are_seen_from_home_or_the_middle_of_their_range():
     assert units.tolist() == [1.0] * 7
     one_sided = unlimited.replace(lower=[0.5, *[-np.inf] * 6])
     assert middle(one_sided)[0].tolist() == [0.5, *[0.0] * 6]
+
+
+@pytest.mark.parametrize("kind", ["TrackObservation", "ShareAction", "DistanceReward", "History"])
+def test_wrappers_of_one_arm_and_of_many_have_the_same_defaults(kind):
+    one, many = (inspect.signature(part).parameters for part in (getattr(rl, kind), getattr(rl.vector, kind).stage))
+    assert {name: value.default for name, value in one.items()} == {name: value.default for name, value in many.items()}
