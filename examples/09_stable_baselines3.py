@@ -14,9 +14,9 @@ ID = "ikgym/Track-v0"
 
 
 def train(steps: int, file: Path) -> None:
-    """Trains with the settings of ``baselines/training/settings/sac.yml`` on eight arms, and saves the model."""
-    envs = ikgym.sb3.make_vec(ID, 8)
-    settings = {"gamma": 0.95, "ent_coef": "auto_0.01", "learning_rate": 1e-3, "learning_starts": min(2000, steps // 2)}
+    """Trains as ``baselines/training/settings/sac.yml`` says, with a constant learning rate, and saves the model."""
+    envs = ikgym.sb3.make_vec(ID, 32)
+    settings = {"gamma": 0.9, "ent_coef": "auto_0.01", "learning_rate": 1e-3, "learning_starts": min(2000, steps // 2)}
     model = SAC("MlpPolicy", envs, **settings, seed=0, device="cpu")
     model.learn(steps)
     model.save(file)
