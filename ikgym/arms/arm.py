@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms import checks
+from ikgym.arms.bodies import Bodies, Neighbour
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import kinematics
 from ikgym.kernels.kinematics import Chain
@@ -62,10 +63,11 @@ class Arm(Frozen):
             Shape (n,).
         home: A posture away from limits and singularities in [rad] or [m], or None. Shape (n,).
         joint_names: Names of the joints in exported data, n different texts; ``joint_1``, ``joint_2``, … by default.
+        bodies: Spheres and capsules on its links, for :meth:`clearance` and for scenarios with collisions.
 
     Raises:
         InvalidInputError: A shape, an axis, an orientation, a limit or a joint's name is wrong, home is outside the
-            limits, or a length beyond 1e12.
+            limits, a body on a link that there is not, or a length beyond 1e12.
     """
 
     name: str
@@ -80,6 +82,7 @@ class Arm(Frozen):
     acceleration_limit: FloatArray = None  # type: ignore[assignment]  # none
     home: FloatArray | None = None
     joint_names: Sequence[str] = ()
+    bodies: Bodies = Bodies()  # noqa: RUF009  # frozen
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for changed copies.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
@@ -102,6 +105,9 @@ class Arm(Frozen):
         fastest = checks.limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf, positive=True)
         hardest = checks.limits(self.name, "acceleration_limit", self.acceleration_limit, n, np.inf, positive=True)
         joint_names = checks.joint_names(self.name, self.joint_names, n)
+        if not isinstance(self.bodies, Bodies):
+            raise InvalidInputError(f"bodies of arm {self.name!r}: expected Bodies, got {shortened(self.bodies)}.")
+        self.bodies.check(n)
         if (lower >= upper).any():
             i = int(np.argmax(lower >= upper))
             raise InvalidInputError(
@@ -222,6 +228,32 @@ class Arm(Frozen):
         from ikgym.arms import inverse  # its kernels take longer to load than all arms
 
         return inverse.inverse(self, rotation, position, start, tolerance=tolerance, restarts=restarts, seed=seed)
+
+    def clearance(
+        self, q: npt.ArrayLike, obstacles: Sequence[Neighbour] = ()
+    ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """The smallest signed distance of the arm's bodies from each other and from obstacles.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (..., n).
+            obstacles: What stands around the arm, at its own place.
+
+        Returns:
+            Distances in [m], below 0 where two bodies overlap and infinite where nothing can meet, of shape (...); and
+            the nearest pairs: the number of a body, and that of another body, or the number of bodies plus that of an
+            obstacle; -1 where nothing can meet. Shape (..., 2).
+
+        Raises:
+            InvalidInputError: q has the wrong length or is not finite.
+            UnknownNameError: An obstacle ignores a body that there is not.
+        """
+        from ikgym.kernels import bodies as kernels  # take longer to load than all arms
+
+        rows, lead = self._rows(q)
+        distances, pairs = np.empty(len(rows)), np.empty((len(rows), 2), dtype=np.int64)
+        around = self.bodies.surroundings(obstacles)
+        kernels.clearance_rows(self.chain, self.bodies.shapes, *around, rows, distances, pairs)
+        return distances.reshape(lead), pairs.reshape(*lead, 2)
 
     def joint_points(self, q: npt.ArrayLike) -> FloatArray:
         """The two ends of each joint in the base frame; they differ where a joint is prismatic.

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ikgym.arms.arm import Arm
+from ikgym.arms.bodies import Bodies
 from ikgym.validation import FloatArray
 
 FILE = pathlib.Path(__file__).with_name("arms.toml")
@@ -41,6 +42,8 @@ def _arm(name: str, tables: dict[str, Any]) -> Arm:
     fields = {key: value for key, value in table.items() if key not in ABOUT}
     if isinstance(fields["axes"], str):
         fields["axes"] = directions(fields["axes"])
+    if "bodies" in fields:
+        fields["bodies"] = Bodies(**fields["bodies"])
     return Arm(name, **fields)
 
 

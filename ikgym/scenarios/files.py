@@ -15,9 +15,12 @@ import numpy as np
 
 from ikgym import arms, files, tasks
 from ikgym.arms import Arm
+from ikgym.arms.bodies import Bodies
 from ikgym.arms.checks import numbered_joints
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.obstacles import KINDS as OBSTACLES
+from ikgym.obstacles import Obstacle
 from ikgym.plant import Plant
 from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
@@ -35,10 +38,13 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
     Path: PATHS,
     TimeLaw: TIME_LAWS,
     Orientation: ORIENTATIONS,
+    Obstacle: OBSTACLES,
 }
-PARTS = (Arm, Task, TrackingCost, Plant, *CHOICES)
+PARTS = (Arm, Bodies, Task, TrackingCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.
 TEXTS = {str, type(None), os.PathLike[str]}
+#: Annotations of lists that hold no numbers.
+NO_NUMBERS = (Sequence[bool], Sequence[str], Sequence[Sequence[str]])
 
 
 def arguments(
@@ -69,8 +75,8 @@ def arguments(
 def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -> Any:
     """The value of an argument with some annotation."""
     kind = _part(hint)
-    if kind is Arm and isinstance(value, list) and typing.get_origin(hint) is Sequence:
-        return [_value(Arm, name, one, folder, where) for one in value]
+    if kind is not None and isinstance(value, list) and typing.get_origin(hint) is Sequence:
+        return [_value(kind, name, one, folder, where) for one in value]
     with located(where):
         if kind is None or kind is Task or (hint is Arm and isinstance(value, str)):
             _check_plain(hint, name, value)
@@ -132,6 +138,8 @@ def _meaning(hint: Any) -> str:
     kind, classes = _part(hint), set(typing.get_args(hint))
     if kind is Arm:
         return "the name of an arm or a table" if hint is Arm else "a list of arms"
+    if kind is not None and typing.get_origin(hint) is Sequence:
+        return "a list of tables"
     if kind is Task or hint is str or (typing.get_origin(hint) is not Sequence and {str} <= classes <= TEXTS):
         return "a text"
     return "numbers" if kind is None else "a table"
@@ -145,9 +153,10 @@ def _check_plain(hint: Any, name: str, value: Any) -> None:
     elif isinstance(value, list):
         for one in value:
             _check_plain(hint, name, one)
-    elif hint not in (Sequence[bool], Sequence[str]) and (
-        isinstance(value, bool) or not isinstance(value, (int, float))
-    ):
+    elif hint in (bool, bool | None):
+        if not isinstance(value, bool):
+            raise InvalidInputError(f"{name}: expected true or false, got {value!r}.")
+    elif hint not in NO_NUMBERS and (isinstance(value, bool) or not isinstance(value, (int, float))):
         raise InvalidInputError(f"{name}: expected numbers, got {value!r}.")
 
 
@@ -202,7 +211,7 @@ def _plain(value: Any, folder: pathlib.Path) -> Any:
         if value.name not in tasks.names() or value != tasks.get(value.name):
             raise InvalidInputError(f"task: expected one of {', '.join(tasks.names())}, got {value!r}.")
         return value.name
-    if isinstance(value, tuple) and value and isinstance(value[0], Arm):
+    if isinstance(value, tuple) and value and isinstance(value[0], PARTS):
         return [_plain(one, folder) for one in value]
     if not isinstance(value, PARTS):
         return value
@@ -220,7 +229,9 @@ def _plain(value: Any, folder: pathlib.Path) -> Any:
     if isinstance(value, Arm):
         return _plain_arm(value, folder)
     fields = _fields(value, folder)
-    return fields if not isinstance(value, Plant) else {name: fields[name] for name in value.switched_on()} or None
+    if isinstance(value, Plant):
+        return {name: fields[name] for name in value.switched_on()} or None
+    return fields if not isinstance(value, Bodies) or len(value) else None
 
 
 def _fields(part: Any, folder: pathlib.Path) -> Table:
@@ -256,8 +267,9 @@ def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
 
 def _same(one: Arm, other: Arm) -> bool:
     """Whether two arms are the same bit for bit, names aside."""
-    return all(
-        np.asarray(getattr(one, f.name)).tobytes() == np.asarray(getattr(other, f.name)).tobytes()
-        for f in dataclasses.fields(Arm)
-        if f.init and f.name != "name"
-    )
+    return _bytes(one) == _bytes(other) and _bytes(one.bodies) == _bytes(other.bodies)
+
+
+def _bytes(part: Arm | Bodies) -> list[bytes]:
+    fields = [f.name for f in dataclasses.fields(part) if f.init and f.name not in ("name", "bodies")]
+    return [np.asarray(getattr(part, name)).tobytes() for name in fields]

@@ -15,7 +15,9 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import OBSTACLE, Surroundings
 from ikgym.kernels.kinematics import Chain, stacked
+from ikgym.obstacles import Obstacle
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.scenarios import checks, durations, files, starts
@@ -51,6 +53,9 @@ class Scenario(Frozen, Reference):
         iterations_per_point: Steps for which the nominal points 1, 2, … are held; the last number holds for all later
             points. Errors and costs of a point count at its last step.
         plant: Deviations of the arm, its drives and its sensors from the data sheet; none by default.
+        obstacles: What stands or moves around the arm, at most 1000, with different names.
+        collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
+            By default it is where there are obstacles.
         source: Origin of the scenario.
 
     Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
@@ -72,6 +77,8 @@ class Scenario(Frozen, Reference):
     initial_pose: FloatArray | None = None
     iterations_per_point: int | tuple[int, ...] = (1,)
     plant: Plant = dataclasses.field(default_factory=Plant)
+    obstacles: Sequence[Obstacle] = ()
+    collisions: bool | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -96,8 +103,11 @@ class Scenario(Frozen, Reference):
         steps = durations.default_steps(self.trajectory, self.dt, held) if self.steps is None else self.steps
         self._settle(steps=checks.step_count("steps", steps, n))
         self.plant.check(self.arm, self.steps)
+        self._settle(obstacles=checks.obstacles(self.name, self.arm, self.obstacles, self.collisions))
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # raises if the arm cannot be there
+        if self.collides and not self.random and not self.plant.draws_arm:
+            self.check_clear(self.start_of())
         checks.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
@@ -134,6 +144,49 @@ class Scenario(Frozen, Reference):
         if type(self) is not Scenario:
             raise InvalidInputError(f"save: expected a Scenario itself, got a {type(self).__name__}.")
         files.save(self._fields(), file)
+
+    @property
+    def collides(self) -> bool:
+        """Whether an arm that touches something is stopped."""
+        return bool(self.obstacles) if self.collisions is None else self.collisions
+
+    @functools.cached_property
+    def surroundings(self) -> Surroundings:
+        """The obstacles as kernels see them: as they are at the start, and which bodies they are checked against."""
+        boxes, checked = self.arm.bodies.surroundings(self.obstacles)
+        return Surroundings(np.ascontiguousarray(self.obstacle_rows(1)[0]).reshape(boxes.shape), checked)
+
+    @functools.cached_property
+    def obstacles_move(self) -> bool:
+        """Whether an obstacle moves; the observation shows them then."""
+        return any(one.motion is not None for one in self.obstacles)
+
+    def obstacle_rows(self, steps: int) -> FloatArray:
+        """The obstacles after 0, 1, … steps, see :class:`ikgym.kernels.bodies.Surroundings`.
+
+        Args:
+            steps: k, the number of rows.
+
+        Returns:
+            Shape (k, o, 16), or (1, o, 16) where none moves.
+        """
+        along = [one.along(self.times(steps), self.model) for one in self.obstacles]
+        rows = max(map(len, along), default=1)
+        out = np.empty((rows, len(along), OBSTACLE))
+        for i, numbers in enumerate(along):
+            out[:, i] = numbers
+        return out
+
+    def check_clear(self, q: FloatArray) -> None:
+        """Checks that the arm touches nothing at the start.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (n,).
+
+        Raises:
+            InvalidInputError: It does; the message names the pair, and how to let it touch.
+        """
+        checks.clear(self.name, self.arm, self.obstacles, self.surroundings, q)
 
     @property
     def cut_off(self) -> float:

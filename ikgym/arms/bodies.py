@@ -1,0 +1,185 @@
+"""Bodies of an arm: spheres and capsules fixed to its links."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Protocol, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import OBSTACLE, Shapes, Surroundings
+from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, known_names, read_only, shortened, whole_number
+
+
+class Neighbour(Protocol):
+    """The part of an obstacle that bodies need, see :mod:`ikgym.obstacles`."""
+
+    @property
+    def ignored(self) -> Sequence[str]:
+        """Names of bodies that may touch it."""
+
+    def numbers(self) -> FloatArray:
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`. Shape (16,)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Bodies(Frozen):
+    """Spheres and capsules fixed to the links of an arm, its tool and what it holds among them.
+
+    A body is all that is within its radius of the segment from its start to its end; a sphere has both in one place.
+    Link 0 is the base, and link i what moves with joint i. The frame of a link has its origin in the joint, behind the
+    offset of :class:`ikgym.Arm`, and is parallel to the base at q = 0; that of link 0 is the base itself.
+
+    Two bodies can meet if they are on different links that are no neighbours, and are not named as a pair that is
+    ignored. Bodies of the base do not meet obstacles.
+
+    Args:
+        names: k different texts.
+        links: Numbers of the links. Shape (k,).
+        starts: One end of each body in the frame of its link, in [m]. Shape (k, 3).
+        ends: The other end, in [m]; the starts if left out. Shape (k, 3).
+        radii: In [m], above 0. Shape (k,).
+        ignored: Pairs of names whose bodies may touch.
+
+    The bodies are sorted by link. Lengths are at most 1e12.
+
+    Raises:
+        InvalidInputError: A shape, a number or a name is wrong, or an ignored pair is none.
+        UnknownNameError: An ignored pair names no body.
+    """
+
+    names: Sequence[str] = ()
+    links: Sequence[int] = ()
+    starts: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+    ends: FloatArray = None  # type: ignore[assignment]  # the starts
+    radii: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    ignored: Sequence[Sequence[str]] = ()
+
+    def __post_init__(self) -> None:
+        names = _names(self.names)
+        links = [whole_number("links of bodies", link, at_least=0) for link in self.links]
+        starts = frozen_array("starts of bodies", np.reshape(self.starts, (-1, 3)), (len(names), 3), at_most=LARGEST)
+        ends = starts if self.ends is None else np.reshape(self.ends, (-1, 3))
+        ends = frozen_array("ends of bodies", ends, starts.shape, at_most=LARGEST)
+        radii = frozen_array("radii of bodies", self.radii, (len(names),), at_most=LARGEST)
+        if len(links) != len(names):
+            raise InvalidInputError(f"links of bodies: expected {len(names)} numbers, got {len(links)}.")
+        for name, radius in zip(names, radii.tolist(), strict=True):
+            if radius <= 0.0:
+                raise InvalidInputError(f"radius of body {name!r}: expected a number above 0, got {radius:g}.")
+        order = np.argsort(links, kind="stable")
+        self._settle(
+            names=tuple(names[i] for i in order),
+            links=tuple(links[i] for i in order),
+            starts=read_only(starts[order]),
+            ends=read_only(ends[order]),
+            radii=read_only(radii[order]),
+            ignored=_pairs(self.ignored, names),
+        )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def added(
+        self,
+        name: str,
+        link: int,
+        start: npt.ArrayLike,
+        end: npt.ArrayLike | None = None,
+        *,
+        radius: float,
+        ignored: Sequence[str] = (),
+    ) -> Self:
+        """A copy with one more body: a sphere at its start, or a capsule to its end.
+
+        Args:
+            name: Its name.
+            link: Number of its link.
+            start: In the frame of the link, in [m]. Shape (3,).
+            end: In the frame of the link, in [m]; the start for a sphere. Shape (3,).
+            radius: In [m].
+            ignored: Names of bodies that it may touch.
+
+        Raises:
+            InvalidInputError: A value is wrong, or the name is taken.
+            UnknownNameError: There is no body of a name.
+        """
+        first = frozen_array(f"start of body {name!r}", start, (3,))
+        last = first if end is None else frozen_array(f"end of body {name!r}", end, (3,))
+        return self.replace(
+            names=(*self.names, name),
+            links=(*self.links, link),
+            starts=np.vstack([self.starts, first]),
+            ends=np.vstack([self.ends, last]),
+            radii=np.append(self.radii, radius),
+            ignored=(*self.ignored, *((name, other) for other in ignored)),
+        )
+
+    def check(self, joints: int) -> None:
+        """Checks that an arm with so many joints has the links.
+
+        Raises:
+            InvalidInputError: It lacks one; the message names the body.
+        """
+        for name, link in zip(self.names, self.links, strict=True):
+            if link > joints:
+                raise InvalidInputError(
+                    f"link of body {name!r}: expected a number from 0, the base, to {joints}, the last, got {link}."
+                )
+
+    @property
+    def pairs(self) -> npt.NDArray[np.int64]:
+        """Numbers of the bodies that can meet: the one on the later link, then the other. Shape (p, 2)."""
+        ignored = {frozenset(pair) for pair in self.ignored}
+        found = [
+            (first, second)
+            for first in range(len(self))
+            for second in range(first)
+            if self.links[first] - self.links[second] > 1
+            and frozenset((self.names[first], self.names[second])) not in ignored
+        ]
+        return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+    @property
+    def shapes(self) -> Shapes:
+        """The bodies as kernels see them."""
+        sizes = 0.5 * np.linalg.norm(self.ends - self.starts, axis=1) + self.radii
+        links = np.array(self.links, dtype=np.int64)
+        return Shapes(links, self.starts.copy(), self.ends.copy(), self.radii.copy(), sizes, self.pairs)
+
+    def surroundings(self, obstacles: Sequence[Neighbour]) -> Surroundings:
+        """Obstacles as kernels see them, those that move at their own place.
+
+        Args:
+            obstacles: The obstacles.
+
+        Raises:
+            UnknownNameError: An obstacle ignores a body that there is not.
+        """
+        boxes = np.array([one.numbers() for one in obstacles]).reshape(-1, OBSTACLE)
+        checked = np.empty((len(obstacles), len(self)), dtype=np.bool_)
+        for row, one in zip(checked, obstacles, strict=True):
+            known_names("body", one.ignored, self.names)
+            row[:] = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
+        return Surroundings(boxes, checked)
+
+
+def _names(given: Any) -> tuple[str, ...]:
+    names = tuple(given) if isinstance(given, (tuple, list)) else ()
+    texts = {one for one in names if isinstance(one, str) and one}
+    if len(names) != len(given) or len(texts) != len(names):
+        raise InvalidInputError(f"names of bodies: expected different texts, got {shortened(given)}.")
+    return names
+
+
+def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    pairs = []
+    for pair in given:
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise InvalidInputError(f"ignored pairs of bodies: expected two names each, got {shortened(pair)}.")
+        known_names("body", pair, names)
+        pairs.append((pair[0], pair[1]))
+    return tuple(pairs)

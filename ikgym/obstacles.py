@@ -1,0 +1,217 @@
+"""Obstacles: spheres, capsules, boxes and half-spaces around an arm, at rest or moving."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.trajectories import Trajectory
+from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix
+
+
+class Obstacle(Frozen, abc.ABC):
+    """Base of all obstacles."""
+
+    name: str
+    motion: Trajectory | None
+    ignored: Sequence[str]
+
+    def _check(self) -> None:
+        """Checks what all obstacles have."""
+        if not isinstance(self.name, str) or not self.name:
+            raise InvalidInputError(f"name of an obstacle: expected a text, got {self.name!r}.")
+        if self.motion is not None and (not isinstance(self.motion, Trajectory) or self.motion.random):
+            raise InvalidInputError(
+                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got {self.motion!r}."
+            )
+        if isinstance(self.ignored, str) or not all(isinstance(one, str) for one in self.ignored):
+            raise InvalidInputError(
+                f"ignored of obstacle {self.name!r}: expected names of bodies, got {self.ignored!r}."
+            )
+        self._settle(ignored=tuple(self.ignored))
+
+    def _vector(self, field: str) -> FloatArray:
+        return frozen_array(f"{field} of obstacle {self.name!r}", getattr(self, field), (3,), at_most=LARGEST)
+
+    def _length(self, field: str) -> float:
+        return number(f"{field} of obstacle {self.name!r}", getattr(self, field), above=0.0, at_most=LARGEST)
+
+    @abc.abstractmethod
+    def numbers(self) -> FloatArray:
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`, at its own place. Shape (16,)."""
+
+    def along(self, times: FloatArray, model: Arm) -> FloatArray:
+        """The numbers at some times; those of an obstacle at rest have a single row.
+
+        Args:
+            times: In [s]. Shape (k,).
+            model: The arm through whose kinematics the motion is mapped where it is a joint path.
+
+        Returns:
+            Shape (k, 16), or (1, 16) at rest.
+        """
+        own = self.numbers()
+        if self.motion is None:
+            return own[None]
+        frames, out = self.motion.frames(times, model), np.tile(own, (len(times), 1))
+        rotations = frames[:, :9].reshape(-1, 3, 3) if frames.shape[1] == 12 else np.tile(IDENTITY, (len(times), 1, 1))
+        out[:, :9] = (rotations @ own[:9].reshape(3, 3)).reshape(-1, 9)
+        out[:, 9:12] = frames[:, -3:] + rotations @ own[9:12]
+        return out
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sphere(Obstacle):
+    """A sphere.
+
+    Args:
+        name: Its name.
+        position: Its centre in the base frame, or in the frame of the motion, in [m]. Shape (3,).
+        radius: In [m].
+        motion: The trajectory of the frame that it is fixed to; at rest if left out.
+        ignored: Names of bodies that may touch it.
+
+    Raises:
+        InvalidInputError: A value is wrong.
+    """
+
+    name: str
+    position: FloatArray
+    radius: float
+    motion: Trajectory | None = None
+    ignored: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check()
+        self._settle(position=self._vector("position"), radius=self._length("radius"))
+
+    def numbers(self) -> FloatArray:
+        """See :meth:`Obstacle.numbers`."""
+        return _row(IDENTITY, self.position, np.zeros(3), self.radius)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Capsule(Obstacle):
+    """All that is within a radius of a segment.
+
+    Args:
+        name: Its name.
+        start: One end of the segment in the base frame, or in the frame of the motion, in [m]. Shape (3,).
+        end: The other end, in [m]. Shape (3,).
+        radius: In [m].
+        motion: The trajectory of the frame that it is fixed to; at rest if left out.
+        ignored: Names of bodies that may touch it.
+
+    Raises:
+        InvalidInputError: A value is wrong.
+    """
+
+    name: str
+    start: FloatArray
+    end: FloatArray
+    radius: float
+    motion: Trajectory | None = None
+    ignored: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check()
+        self._settle(start=self._vector("start"), end=self._vector("end"), radius=self._length("radius"))
+
+    def numbers(self) -> FloatArray:
+        """See :meth:`Obstacle.numbers`."""
+        along = self.end - self.start
+        length = float(np.linalg.norm(along))
+        rotation = IDENTITY if length == 0.0 else _towards(along / length)
+        return _row(rotation, 0.5 * (self.start + self.end), np.array([0.0, 0.0, 0.5 * length]), self.radius)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Box(Obstacle):
+    """A box.
+
+    Args:
+        name: Its name.
+        position: Its centre in the base frame, or in the frame of the motion, in [m]. Shape (3,).
+        size: Lengths of its edges in [m], above 0. Shape (3,).
+        rotation: A rotation matrix whose columns are the directions of its edges. Shape (3, 3).
+        motion: The trajectory of the frame that it is fixed to; at rest if left out.
+        ignored: Names of bodies that may touch it.
+
+    Raises:
+        InvalidInputError: A value is wrong.
+    """
+
+    name: str
+    position: FloatArray
+    size: FloatArray
+    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+    motion: Trajectory | None = None
+    ignored: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check()
+        size = self._vector("size")
+        if (size <= 0.0).any():
+            raise InvalidInputError(f"size of obstacle {self.name!r}: expected numbers above 0, got {size.tolist()}.")
+        rotation = rotation_matrix(f"rotation of obstacle {self.name!r}", self.rotation)
+        self._settle(position=self._vector("position"), size=size, rotation=rotation)
+
+    def numbers(self) -> FloatArray:
+        """See :meth:`Obstacle.numbers`."""
+        return _row(self.rotation, self.position, 0.5 * self.size, 0.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HalfSpace(Obstacle):
+    """All that is on one side of a plane, such as a floor or a wall.
+
+    Args:
+        name: Its name.
+        position: A point of the plane in the base frame, or in the frame of the motion, in [m]. Shape (3,).
+        normal: The direction out of it, a vector of any length above 0. Shape (3,).
+        motion: The trajectory of the frame that it is fixed to; at rest if left out.
+        ignored: Names of bodies that may touch it.
+
+    Raises:
+        InvalidInputError: A value is wrong.
+    """
+
+    name: str
+    position: FloatArray
+    normal: FloatArray
+    motion: Trajectory | None = None
+    ignored: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self._check()
+        normal = self._vector("normal")
+        if not normal.any():
+            raise InvalidInputError(f"normal of obstacle {self.name!r}: expected a direction, got the zero vector.")
+        self._settle(position=self._vector("position"), normal=normal)
+
+    def numbers(self) -> FloatArray:
+        """See :meth:`Obstacle.numbers`."""
+        normal = self.normal / np.linalg.norm(self.normal)
+        return _row(_towards(normal), self.position, np.full(3, -1.0), 0.0)
+
+
+#: The kinds of obstacles by their names in scenario files.
+KINDS: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "box": Box, "half_space": HalfSpace}
+
+
+def _row(rotation: FloatArray, position: FloatArray, half: FloatArray, radius: float) -> FloatArray:
+    return np.concatenate([np.ravel(rotation), position, half, [radius]])
+
+
+def _towards(direction: FloatArray) -> FloatArray:
+    """A rotation whose third axis is a unit vector."""
+    other = np.zeros(3)
+    other[np.argmin(np.abs(direction))] = 1.0
+    first = np.cross(other, direction)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(direction, first), direction])
