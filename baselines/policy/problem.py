@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
+from ikgym.kernels.bodies import Surroundings
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
@@ -28,6 +29,8 @@ class Problem(Frozen):
         cost: The stage cost.
         dt: Δt in [s].
         velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
+        surroundings: The obstacles as they are at the start; None where touching does not matter.
+        obstacles_shown: Whether observations show the obstacles, which are others at each step or in each episode.
     """
 
     model: Arm
@@ -35,6 +38,8 @@ class Problem(Frozen):
     cost: TrackingCost
     dt: float
     velocity_limit: FloatArray
+    surroundings: Surroundings | None = None
+    obstacles_shown: bool = False
 
     def __post_init__(self) -> None:
         limit = frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,))
@@ -48,7 +53,11 @@ class Problem(Frozen):
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """The problem of a scenario."""
-        return cls(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit)
+        usual = scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit
+        if not scenario.collides:
+            return cls(*usual)
+        model = scenario.model.replace(bodies=scenario.arm.bodies)
+        return cls(model, *usual[1:], scenario.surroundings, scenario.obstacles_shown)
 
 
 class Batch(NamedTuple):

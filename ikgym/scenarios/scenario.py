@@ -157,9 +157,9 @@ class Scenario(Frozen, Reference):
         return Surroundings(np.ascontiguousarray(self.obstacle_rows(1)[0]).reshape(boxes.shape), checked)
 
     @functools.cached_property
-    def obstacles_move(self) -> bool:
-        """Whether an obstacle moves; the observation shows them then."""
-        return any(one.motion is not None for one in self.obstacles)
+    def obstacles_shown(self) -> bool:
+        """Whether the observation shows the obstacles: where one moves."""
+        return self.collides and any(one.motion is not None for one in self.obstacles)
 
     def obstacle_rows(self, steps: int) -> FloatArray:
         """The obstacles after 0, 1, … steps, see :class:`ikgym.kernels.bodies.Surroundings`.
