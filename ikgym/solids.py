@@ -59,16 +59,39 @@ def on_links(bodies: Bodies) -> FloatArray:
     return _capsules(np.hstack([bodies.starts, bodies.ends, middles]), bodies.radii)
 
 
-def surface(size: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def link_frames(arm: Arm, q: FloatArray) -> FloatArray:
+    """The frames of the links of an arm, that of the base first.
+
+    Args:
+        arm: The arm.
+        q: Joint coordinates in [rad] or [m]. Shape (N, n).
+
+    Returns:
+        Rotations, row by row, and positions in [m]. Shape (N, n + 1, 12).
+    """
+    rotation, position = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
+    frames = [(rotation, position)]
+    for coordinate, offset, axis, prismatic in zip(q.T[..., None], arm.offsets, arm.axes, arm.prismatic, strict=True):
+        position = position + np.einsum("kij,kj->ki", rotation, offset + coordinate * axis * prismatic)
+        if not prismatic:
+            cross = np.cross(axis, np.eye(3)).T
+            sine, versine = np.sin(coordinate)[..., None], 1.0 - np.cos(coordinate)[..., None]
+            rotation = rotation @ (np.eye(3) + sine * cross + versine * (cross @ cross))
+        frames.append((rotation, position))
+    return np.stack([np.hstack([turned.reshape(-1, 9), at]) for turned, at in frames], axis=1)
+
+
+def surface(size: FloatArray, stretches: int = STRETCHES) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """The surface of a solid in its own frame, as triangles.
 
     Args:
         size: Half of the edges, and the radius, in [m]: the last four numbers of a row. Shape (4,).
+        stretches: Into which a quarter of a circle is divided.
 
     Returns:
         Vertices in [m], of shape (v, 3), and the numbers of three of them for each triangle, of shape (t, 3).
     """
-    angles, (east, north) = _circle(size[3])
+    angles, (east, north) = _circle(size[3], stretches)
     along = 2 * (len(angles) // 4)
     polar = angles[:along]  # from one pole to the other
     directions = [np.outer(np.sin(polar), np.cos(angles)), np.outer(np.sin(polar), np.sin(angles))]
@@ -91,7 +114,7 @@ def outline(size: FloatArray) -> FloatArray:
     Returns:
         Points in [m]. Shape (p, 3).
     """
-    angles, signs = _circle(size[3])
+    angles, signs = _circle(size[3], STRETCHES)
     ring = np.stack([np.cos(angles), np.sin(angles)]), np.stack(signs)
     lines = []
     for axis in range(3):
@@ -138,12 +161,12 @@ def _capsules(placed: FloatArray, radii: FloatArray) -> FloatArray:
     return out
 
 
-def _circle(radius: float) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+def _circle(radius: float, stretches: int) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
     """Angles around a circle, the ends of its quarters twice, with the signs of cosine and sine in each quarter.
 
     Without a radius, each quarter is a corner, and one angle will do.
     """
-    quarter = np.linspace(0.0, 0.5 * np.pi, STRETCHES + 1 if radius > 0.0 else 1)
+    quarter = np.linspace(0.0, 0.5 * np.pi, stretches + 1 if radius > 0.0 else 1)
     east, north = (np.repeat(pattern, len(quarter)) for pattern in ((1.0, -1.0, -1.0, 1.0), (1.0, 1.0, -1.0, -1.0)))
     return np.concatenate([0.5 * np.pi * k + quarter for k in range(4)]), (east, north)
 
