@@ -114,7 +114,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, also given by `spec.max_episode_steps`. Terminated
-    where the position error exceeds `lost_distance`, if there is one.
+    where the position error exceeds `lost_distance`, or bodies touch, if there is such a distance.
 
     Args:
         scenario: A scenario, or its name: a registered one, a file ending in `.toml`, or
@@ -243,7 +243,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             info["clearance"], info["collision"] = met[0], met[1] > 0.0
         if self._pictures is not None:
             self._pictures.add(position, orientation)
-        lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps
+        ends, over = self.lost_distance is not None, self._step == self._steps
+        lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over
         return seen, -(tracking + velocity), lost, over, info
 
