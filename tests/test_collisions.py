@@ -129,6 +129,21 @@ def test_info_has_the_clearance_of_the_arm(scenario):
         assert not terminated
 
 
+def test_bodies_belong_to_the_arm_that_moves(scenario):
+    plant = Plant(zero=0.02, link=5e-3, axis=0.02, payload=0.02, payload_step=15)
+    drawn = scenario.replace(plant=plant, obstacles=OBSTACLES[1:2])
+    env = gym.make("RedundantIK-v0", scenario=drawn)
+    seen, _ = env.reset(seed=4)
+    moved = drawn.drawn_plant(4)
+    for k, action in enumerate(wild(1, 30)[:, 0], start=1):
+        seen, _, _, _, info = env.step(action)
+        arm = moved.loaded_arm if k >= 15 else moved.arm
+        assert not info["collision"]
+        assert info["clearance"] == pytest.approx(arm.clearance(seen["q"], drawn.obstacles)[0], abs=1e-12)
+        ends, tool = arm.bodies.ends, drawn.arm.tool
+        assert np.linalg.norm(ends[-1]) == pytest.approx(np.linalg.norm(tool), abs=1e-12)
+
+
 def test_an_arm_that_is_stopped_pays_to_the_end(scenario):
     env = gym.make("RedundantIK-v0", scenario=scenario)
     env.reset(seed=1)
