@@ -80,8 +80,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     `q` and `pose` are the measurements of the scenario's plant; with an ideal plant they are exact.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives only those steps.
     A row of `obstacles` has a rotation, row by row, a position, half of the edges and a radius, see
-    :class:`ikgym.kernels.bodies.Surroundings`. The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
-    the limits, the number of steps and the arm's reach.
+    :class:`ikgym.kernels.bodies.Surroundings`. The nominal goes on past the end of the episode. All bounds are finite
+    and true: they follow from the start, the limits, the number of steps and the arm's reach.
 
     ## Reward
     −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
