@@ -24,7 +24,6 @@ class Pictures:
         around = scenario.surroundings if scenario.collides else None
         oriented = scenario.task.has_orientation
         self.renderer = Renderer(scenario.arm, mode, title=scenario.name, has_orientation=oriented, surroundings=around)
-        self._boxes = None if around is None else scenario.obstacle_rows(scenario.steps + 1)
 
     def begin(self, position_error: float, orientation_error: float) -> None:
         """Records the first state of an episode, with its errors in [m] and [rad]."""
@@ -35,10 +34,8 @@ class Pictures:
     def add(self, position_error: float, orientation_error: float) -> None:
         """Records a state, with its errors in [m] and [rad]."""
         simulator, row = self._simulator, self._row
-        step = int(simulator.steps_made[row])
-        boxes = None if self._boxes is None else self._boxes[min(step, len(self._boxes) - 1)]
-        time = step * simulator.scenario.dt
-        self.renderer.add(simulator.true_q[row].copy(), position_error, orientation_error, time, boxes)
+        time, q = int(simulator.steps_made[row]) * simulator.scenario.dt, simulator.true_q[row].copy()
+        self.renderer.add(q, position_error, orientation_error, time, simulator.obstacles(row))
         if self._human:
             self.renderer.draw()
 
