@@ -106,8 +106,6 @@ class Scenario(Frozen, Reference):
         self._settle(obstacles=checks.obstacles(self._fields()))
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # raises if the arm cannot be there
-        if self.collides and not self.random and not self.plant.draws_arm:
-            self.check_clear(self.start_of())
         checks.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
@@ -215,17 +213,6 @@ class Scenario(Frozen, Reference):
     def _step_times(self) -> FloatArray:
         """The times of the nominal points after 0, 1, … steps, in [s]. Shape (steps + 1,)."""
         return self.points() * self.dt
-
-    def check_clear(self, q: FloatArray) -> None:
-        """Checks that the arm touches nothing at the start.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]. Shape (n,).
-
-        Raises:
-            InvalidInputError: It does; the message names the pair, and how to let it touch.
-        """
-        checks.clear(self.name, self.arm, self.obstacles, self.surroundings, q)
 
     @property
     def cut_off(self) -> float:
