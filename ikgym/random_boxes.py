@@ -89,6 +89,12 @@ class RandomBoxes(Obstacle):
         rows[:, 11] = -AWAY
         return rows
 
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The smallest and the largest numbers that a box may have. Shapes (16,)."""
+        turned = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        low = np.concatenate([-turned, [1.0], self.lower, 0.5 * self.smallest, [0.0]])
+        return low, np.concatenate([turned, [1.0], self.upper, 0.5 * self.largest, [0.0]])
+
     def draw(self, arm: Arm, paths: FloatArray, keys: npt.NDArray[np.uint64]) -> FloatArray:
         """The boxes of several episodes.
 

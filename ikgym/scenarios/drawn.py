@@ -64,3 +64,19 @@ def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle,
         out += one.boxes(numbers[at : at + one.count]) if isinstance(one, RandomBoxes) else (one,)
         at += one.count
     return tuple(out)
+
+
+def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest and the largest numbers of obstacles in any episode.
+
+    Args:
+        obstacles: The obstacles.
+        low: The smallest numbers of those that are not drawn; others do not matter. Shape (o, 16).
+        high: The largest ones. Shape (o, 16).
+    """
+    low, high, at = low.copy(), high.copy(), 0
+    for one in obstacles:
+        if isinstance(one, RandomBoxes):
+            low[at : at + one.count], high[at : at + one.count] = one.bounds()
+        at += one.count
+    return low, high

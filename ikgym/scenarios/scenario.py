@@ -175,6 +175,16 @@ class Scenario(Frozen, Reference):
         parts = [np.broadcast_to(numbers, (rows, *numbers.shape[1:])) for numbers in along]
         return np.concatenate([np.empty((rows, 0, OBSTACLE)), *parts], axis=1)
 
+    def obstacle_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The smallest and the largest numbers that obstacles have in any episode. Shapes (o, 16)."""
+        rows = self.obstacle_rows(self.steps + 2)
+        return drawn.bounds(self.obstacles, rows.min(axis=0), rows.max(axis=0))
+
+    @property
+    def draws_obstacles(self) -> bool:
+        """Whether obstacles are drawn when an episode begins."""
+        return any(one.random for one in self.obstacles)
+
     def drawn_obstacles(self, episodes: Sequence[Trajectory], generators: Sequence[np.random.Generator]) -> FloatArray:
         """The obstacles at the start of several episodes, those among them that are drawn.
 
@@ -200,7 +210,7 @@ class Scenario(Frozen, Reference):
         Raises:
             InvalidInputError: There is no seed where one is needed, or no room for an obstacle.
         """
-        if not any(one.random for one in self.obstacles):
+        if not self.draws_obstacles:
             return tuple(self.obstacles)
         if seed is None:
             raise InvalidInputError(f"Scenario {self.name!r} draws obstacles: a seed says which episode is meant.")
