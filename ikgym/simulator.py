@@ -21,7 +21,7 @@ from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.contacts import check_clear, plant_rows
+from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
 from ikgym.scenarios.motion_frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
@@ -68,7 +68,7 @@ class Simulator:
         self._nominal = frames_of_rows(scenario, rows, self.preview, memory, AT_ONCE)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
-            obstacles = len(scenario.obstacles) if scenario.obstacles_shown else 0
+            obstacles = len(scenario.surroundings.boxes) if scenario.obstacles_shown else 0
             shown += more_size(joints, coordinates, commands, obstacles)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
         check_memory(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
@@ -137,10 +137,13 @@ class Simulator:
         rows = np.flatnonzero(active)
         if len(rows) == 0:
             return
-        episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
+        own = [generators[row] for row in rows.tolist()]
+        episodes = scenario.trajectory.samples(own)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
+            if scenario.draws_obstacles and self._plant.contacts is not None:
+                draw_obstacles(scenario, self._plant.contacts, rows, episodes, own)
         if starts is None:
             chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
             state.q[rows], state.qdot[rows] = first_states(scenario, self._nominal.point, episodes, steps, chains)
