@@ -5,6 +5,7 @@ All of them are boxes with rounded edges, rows of :class:`ikgym.kernels.bodies.S
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.arms.bodies import Bodies
-from ikgym.obstacles import towards
+from ikgym.obstacles import Obstacle, towards
 from ikgym.validation import BoolArray, FloatArray
 
 #: Stretches into which a quarter of a circle is divided.
@@ -51,6 +52,22 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
     placed = np.empty((rows, len(arm.bodies), 9))
     closest_rows(arm.chain, shapes, boxes, checked, np.ascontiguousarray(q), distances, pairs, points, placed)
     return Closest(distances, pairs, points, _capsules(placed, shapes.radii))
+
+
+def solids_of(obstacles: Sequence[Obstacle], times: FloatArray, model: Arm) -> FloatArray:
+    """The obstacles of an episode at some times.
+
+    Args:
+        obstacles: See :meth:`ikgym.Scenario.obstacles_of`.
+        times: In [s]. Shape (k,).
+        model: The arm through whose kinematics motions are mapped that are joint paths.
+
+    Returns:
+        Shape (k, o, 16), or (1, o, 16) where none moves.
+    """
+    along = [one.along(times, model) for one in obstacles]
+    rows = max(map(len, along), default=1)
+    return np.stack([np.broadcast_to(one, (rows, 16)) for one in along], axis=1) if along else np.empty((1, 0, 16))
 
 
 def on_links(bodies: Bodies) -> FloatArray:

@@ -93,7 +93,7 @@ class Branch:
         return self.asked is not None and self.shortest is not None
 
     def rank(self) -> tuple[float, ...]:
-        """The smaller, the better: share of path, time as asked, a given start, clearance, room, shortest time."""
+        """The smaller, the better: share of the path, time, a given start, clearance, room, shortest time."""
         if self.asked is None or self.shortest is None:
             return -self.reached, self.position_error
         slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
@@ -146,7 +146,7 @@ class Survey:
 
 
 def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
-    """Whether all poses are met within errors in [m] and [rad], no limit of the arm holds back a joint, and nothing touches."""
+    """Whether poses are met within errors in [m] and [rad], no limit holds back a joint, and nothing touches."""
     position, orientation = motion.position_error.max(), motion.orientation_error.max()
     free = not motion.held_back.any() and not motion.stopped.any()
     return bool(position <= errors[0] and orientation <= errors[1] and free)

@@ -23,6 +23,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import Surroundings
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
+from ikgym.solids import solids_of
 from ikgym.validation import FloatArray, whole_number
 
 # Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
@@ -87,8 +88,9 @@ class Stage:
 
     @functools.cached_property
     def boxes(self) -> FloatArray:
-        """The obstacles after 0, 1, … steps, once if none moves, see :meth:`ikgym.Scenario.obstacle_rows`."""
-        return self.scenario.obstacle_rows(self.scenario.steps + 1)
+        """The obstacles after 0, 1, … steps, once if none moves, see :func:`ikgym.solids.solids_of`."""
+        scenario = self.scenario
+        return solids_of(scenario.obstacles_of(self.seed), scenario.times(scenario.steps + 1), scenario.model)
 
     def obstacles(self, step: int) -> FloatArray:
         """The obstacles after so many steps. Shape (o, 16)."""

@@ -122,7 +122,8 @@ class Renderer:
         self._tools = k
         if anew := not self._staged:
             start = np.vstack([self._arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
-            scene.set_stage(self._nominal, start, margin=0.08 * self._arm.reach(self._q[0]), duration=self._duration)
+            margin = 0.08 * self._arm.reach(self._q[0])
+            scene.set_stage(self._nominal, start, margin, self._duration, self._boxes)
             self._staged = True
         scene.set_arm(self._arm.joint_points(self._q[k - 1]), rotations[-1], self._tool[:k], self._nominal)
         scene.set_solids(self._q[k - 1], self._boxes)

@@ -100,7 +100,9 @@ class Scene:
             # A canvas also draws by itself, when its window is resized or the view turned.
             figure.canvas.mpl_connect("draw_event", self._keep_background)
 
-    def set_stage(self, nominal: FloatArray, start: FloatArray, margin: float, duration: float) -> None:
+    def set_stage(
+        self, nominal: FloatArray, start: FloatArray, margin: float, duration: float, boxes: FloatArray | None = None
+    ) -> None:
         """Sets the parts that are fixed during an episode.
 
         Args:
@@ -108,11 +110,12 @@ class Scene:
             start: Points of the arm at the start in [m]. Shape (any, 3).
             margin: Space around base, nominal path and start, in [m].
             duration: Of the episode, in [s].
+            boxes: The obstacles; None for those at the start. Shape (o, 16).
         """
         self._nominal.set_data_3d(thinned(nominal, stride(len(nominal))).T)
         points = np.vstack([np.zeros(3), start, nominal])
         if self._solids is not None:
-            points = np.vstack([points, self._solids.extent()])
+            points = np.vstack([points, self._solids.extent(boxes)])
         low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         self._frame_length = FRAME * float((high - low).max())
         # Nothing is readable in a flat box.

@@ -33,9 +33,13 @@ class SolidLines:
         #: The lines that are there.
         self.lines = [one for one in (self._obstacles, self._bodies, self._pair) if one is not None]
 
-    def extent(self) -> FloatArray:
-        """Points that the picture has to show in [m]: those of obstacles at the start, within reach. Shape (k, 3)."""
-        boxes = self._surroundings.boxes
+    def extent(self, boxes: FloatArray | None) -> FloatArray:
+        """Points of obstacles that the picture has to show in [m], within reach. Shape (k, 3).
+
+        Args:
+            boxes: The obstacles; None for those at the start. Shape (o, 16).
+        """
+        boxes = self._surroundings.boxes if boxes is None else boxes
         points = _outlines(boxes[boxes[:, 12] >= 0.0])
         return np.clip(points[np.isfinite(points[:, 0])], -self._view[1], self._view[1])
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from baselines.episodes import Seeds
 from ikgym.scenarios import Scenario
-from ikgym.solids import closest, link_frames, on_links
+from ikgym.solids import closest, link_frames, on_links, solids_of
 from ikgym.validation import FloatArray
 
 #: The frame of what does not move.
@@ -33,13 +33,14 @@ def carried(
         those of the others; and ``closest`` (f, 2, 3) in [m].
     """
     plant, bodies = scenario.drawn_plant(seeds.seed, seeds.arm_seed), scenario.arm.bodies
-    boxes = scenario.obstacle_rows(int(after[-1]) + 1)
-    boxes = boxes[np.minimum(after, len(boxes) - 1)]
+    obstacles = scenario.obstacles_of(seeds.seed)
+    boxes = solids_of(obstacles, scenario.dt * after.astype(np.float64), scenario.model)
+    boxes = np.broadcast_to(boxes, (len(q), *boxes.shape[1:]))
     frames, points = np.empty((len(q), scenario.joints + 1, 12)), np.empty((len(q), 2, 3))
     for arm, rows in ((plant.arm, after < plant.payload_step), (plant.loaded_arm, after >= plant.payload_step)):
         frames[rows] = link_frames(arm, q[rows])
         points[rows] = closest(arm, q[rows], boxes[rows], scenario.surroundings.checked).points
-    moving = [number for number, one in enumerate(scenario.obstacles) if one.motion is not None]
+    moving = [number for number, one in enumerate(obstacles) if one.motion is not None]
     solids, own = boxes[0].copy(), np.full(len(boxes[0]), scenario.joints + 1)
     solids[moving, :12], own[moving] = AT_REST, scenario.joints + 2 + np.arange(len(moving))
     still = np.tile(AT_REST, (len(q), 1, 1))
