@@ -14,7 +14,9 @@ import ikgym
 from ikgym import arms
 from ikgym.rendering import Renderer, renderer, scene, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
+from tests.bodied import crowd
 
+LINES = ("bodies", "obstacles", "closest pair")
 STEPS = 12  # the longest command delay of a scenario, at least
 
 
@@ -283,3 +285,30 @@ def test_copies_draw_the_episode_on_a_figure_of_their_own():
     np.testing.assert_array_equal(twin.render(), fresh.render())
     assert not np.array_equal(picture, env.render())
     assert renderer_of(twin).figure is not renderer_of(env).figure
+
+
+def test_bodies_obstacles_and_the_closest_pair_are_drawn_where_touching_matters():
+    env = ikgym.RedundantIKEnv(crowd(steps=STEPS), render_mode="rgb_array")
+    env.reset(seed=0)
+    env.render()
+    before = np.array(artist(env, "obstacles").get_data_3d())
+    for _ in range(3):
+        *_, info = move(env)
+    env.render()
+    bodies, obstacles, pair = (np.array(artist(env, name).get_data_3d()) for name in LINES)
+    distance = np.linalg.norm(pair[:, 0] - pair[:, 1])
+    assert distance == pytest.approx(info["clearance"], abs=1e-12)
+    assert f"clearance {1e3 * distance:.1f} mm" in renderer_of(env)._scene._heading.get_text()
+    moved = np.nan_to_num(np.abs(obstacles - before)).max(axis=0) > 0.0
+    assert 0.1 < moved.mean() < 0.5  # the ball alone
+    middle = env.unwrapped.scenario.arm.joint_points(env.unwrapped._simulator.true_q[0])[3, 1]
+    assert np.nanmin(np.linalg.norm(bodies.T - middle, axis=1)) < 0.2
+
+
+def test_nothing_of_it_is_drawn_elsewhere():
+    for scenario in (short("panda-circle"), crowd(steps=STEPS).replace(collisions=False)):
+        env = ikgym.RedundantIKEnv(scenario, render_mode="rgb_array")
+        env.reset(seed=0)
+        env.render()
+        assert not renderer_of(env).figure.findobj(lambda a: a.get_gid() in LINES)
+        assert "clearance" not in renderer_of(env)._scene._heading.get_text()

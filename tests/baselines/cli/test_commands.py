@@ -15,6 +15,7 @@ import baselines
 import ikgym
 from baselines import cli
 from baselines.cli import main
+from tests.bodied import crowd
 
 ROOT = Path(__file__).parents[3]
 
@@ -200,6 +201,25 @@ def test_an_arm_and_a_scenario_are_shown(capsys):
     assert re.search(r"^joint_3 +prismatic +none +none +none +none$", text, re.MULTILINE)
     assert main(["scenarios", "varga7-fast"]) == 0
     assert "varga7-fast: 3000 steps of 0.001 s" in capsys.readouterr().out
+
+
+def test_bodies_and_obstacles_are_listed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    crowd().save("mine.toml")
+    assert main(["arms", "panda"]) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"^moved by +bodies; \d+ pairs of them can meet$", text, re.MULTILINE)
+    assert re.search(r"^the base +link0 \(capsule of 0\.\d+ m, radius 0\.\d+ m\)$", text, re.MULTILINE)
+    assert main(["scenarios", "mine.toml"]) == 0
+    text = capsys.readouterr().out
+    for kind, names in (("half space", "floor"), ("box", "box"), ("sphere", r"ball \(moves\)"), ("capsule", "pipe")):
+        assert re.search(f"^  {kind} +{names}$", text, re.MULTILINE)
+    assert re.search(r"^  bodies +\d+ on the arm, \d+ pairs of which can meet$", text, re.MULTILINE)
+    assert "an arm that touches something is stopped" in text
+    assert main(["arms", "varga7"]) == main(["scenarios", "varga7-fast"]) == 0
+    text = capsys.readouterr().out
+    assert "bodies" not in text
+    assert "collisions" not in text
 
 
 def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):

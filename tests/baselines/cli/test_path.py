@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -96,3 +97,25 @@ def test_a_branch_of_ones_own_choice(capsys):
 def test_bad_input(words, message, capsys):
     assert main(words) == 2
     assert message in capsys.readouterr().err
+
+
+def test_obstacles_of_a_file(capsys):
+    Path("weld.csv").write_text("x, y, z\n0.45, -0.2, 0.4\n0.55, 0, 0.4\n0.45, 0.2, 0.4\n")
+    box = '[[obstacles]]\nkind = "box"\nname = "block"\nposition = [0.55, 0.0, 0.4]\nsize = [0.1, 0.1, 0.1]\n'
+    Path("cell.toml").write_text(box)
+    words = ["path", "weld.csv", "--arm", "panda", "--speed", "0.2", "--dt", "0.01"]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"  clearance  .* mm: link\w+, link\w+", text, re.DOTALL)
+    assert "It can be driven" in text
+    assert main([*words, "--obstacles", "cell.toml"]) == 0
+    text = capsys.readouterr().out
+    assert re.search(r"touch at [\d.]+ s: link\w+, block", text)
+    assert re.search(r"no start leads along all of it clear\. In the farthest 'link\w+' and 'block' touch at", text)
+    assert main([*words, "--obstacles", "cell.toml", "--bodies", "off"]) == 0
+    text = capsys.readouterr().out
+    assert "clearance" not in text
+    assert "It can be driven" in text
+    Path("cell.toml").write_text(box.replace("size", "sizes"))
+    assert main([*words, "--obstacles", "cell.toml"]) == 2
+    assert "cell.toml" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """Policies with free timing in the table: time and error along the path, beside the costs on the clock."""
 
+import csv
 import json
 
 import numpy as np
@@ -98,9 +99,8 @@ def test_the_motion_that_is_exported_goes_on_to_the_end_of_the_path(tmp_path):
     assert steps < len(points) <= steps + 1 + FEWEST  # with the last bit of a stop
     start, end = (scenario.arm.forward(points[k]["positions"])[1] for k in (0, -1))
     np.testing.assert_allclose(end, start, rtol=0, atol=1e-4)  # a whole turn
-    header, line = (tmp_path / "results.csv").read_text().splitlines()
-    assert header.endswith("path_time,path_position_error,path_orientation_error")
-    assert float(line.split(",")[-3]) == one.path_time
+    (line,) = csv.DictReader((tmp_path / "results.csv").read_text().splitlines())
+    assert float(line["path_time"]) == one.path_time
 
 
 @pytest.mark.parametrize("name", ["varga7-random", "zhang6-lspb", "panda-circle", "khan8-q1"])

@@ -1,0 +1,160 @@
+"""Rows, tables, logs and pages of scenarios with collisions, beside those of others."""
+
+import csv
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.episodes import Seeds, rollout, rollouts
+from baselines.evaluate import evaluate
+from baselines.evaluation import report
+from baselines.evaluation.export import CONTACTS, check_log, trajectory_log
+from baselines.evaluation.html.series import BUDGET, thinned
+from baselines.evaluation.records import markdown, records
+from baselines.evaluation.results import read_rows
+from baselines.evaluation.summary import summarise
+from ikgym.solids import closest
+from tests.baselines.evaluation.html.test_series import decoded
+from tests.bodied import blocked, crowd
+
+COLUMNS = ("clearance_min", "closest_pair", "closest_step", "stopped")
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    """One that is stopped, one that is not, and one that nothing can stop; with the folder."""
+    folder = tmp_path_factory.mktemp("contacts")
+    scenarios = blocked(), crowd(), ikgym.scenarios.get("panda-circle").replace(steps=30)
+    return evaluate(scenarios, "dls", out=folder), folder
+
+
+@pytest.fixture(scope="module")
+def log():
+    scenario = crowd()
+    return scenario, trajectory_log(scenario, Seeds(0), rollout(scenario, baselines.make("dls", scenario), 0))
+
+
+def test_a_row_has_the_step_of_the_stop_and_what_touched(rows):
+    row, scenario = rows[0][0], blocked()
+    env = gym.make("RedundantIK-v0", scenario=scenario)
+    seen, _ = env.reset(seed=0)
+    policy, infos = baselines.make("dls", scenario), [{"collision": False}]
+    while not infos[-1]["collision"]:
+        seen, *_, info = env.step(policy.predict(seen)[0])
+        infos.append(info)
+    assert row.stopped == row.closest_step == len(infos) - 1 < scenario.steps
+    assert row.clearance_min == min(info["clearance"] for info in infos[1:]) < 1e-3
+    assert row.closest_pair[1] == "post"
+    assert row.closest_pair[0] in scenario.arm.bodies.names
+    assert row.position_error_max > 0.01
+
+
+def test_a_row_has_the_smallest_clearance_where_nothing_stops(rows):
+    row, scenario = rows[0][1], crowd()
+    q = baselines.track(scenario, "dls").q
+    found = closest(scenario.arm, q, scenario.obstacle_rows(61)[1:], scenario.surroundings.checked)
+    assert row.stopped is None
+    assert row.clearance_min == pytest.approx(found.distances.min(), abs=1e-12)
+    assert row.closest_step == found.distances.argmin() + 1
+
+
+def test_other_scenarios_have_no_such_values(rows):
+    assert [getattr(rows[0][2], name) for name in COLUMNS] == [None] * 4
+
+
+def test_rows_are_read_again_also_those_of_before(rows):
+    _, folder = rows
+    file = folder / "results.json"
+    assert read_rows(file) == list(rows[0])
+    old = json.loads(file.read_text())[2:]
+    for name in COLUMNS:
+        del old[0][name]
+    (folder / "old.json").write_text(json.dumps(old))
+    assert read_rows(folder / "old.json") == [rows[0][2]]
+    first, *_ = csv.DictReader((folder / "results.csv").read_text().splitlines())
+    assert json.loads(first["closest_pair"]) == rows[0][0].closest_pair
+
+
+def test_tables_state_stops_where_there_can_be_any(rows):
+    stopped, clear, free = rows[0]
+    assert [one.stopped for one in summarise(rows[0])] == [1, 0, None]
+    text = report.table([stopped, clear])
+    assert "clearance" in text
+    assert "stopped: episodes in which they would have met" in " ".join(text.split())
+    assert "stopped" not in report.table([free])
+    first, second = records([stopped, clear])
+    assert (first["stopped_percent"], second["stopped_percent"]) == (100.0, 0.0)
+    assert second["clearance_mm"] == 1e3 * clear.clearance_min
+    assert "stopped [%]" in markdown([first, second])
+    assert "stopped_percent" not in records([free])[0]
+
+
+def test_episodes_side_by_side_have_what_single_ones_have():
+    scenario = blocked()
+    policy = baselines.make("dls", scenario)
+    single = rollout(scenario, policy, 0)
+    for one in rollouts(scenario, policy, [0, 1]):
+        for name in ("clearance", "pair", "stopped"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(single, name))
+    assert single.stopped.any()
+
+
+def test_a_wrapped_policy_is_measured_alike(rows):
+    class Plain:
+        preview = 1
+
+        def __init__(self):
+            self.policy = baselines.make("dls", blocked())
+
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            return self.policy.predict(observation, state)
+
+    (row,) = evaluate(blocked(), Plain(), wrap=gym.wrappers.OrderEnforcing)
+    expected = rows[0][0]
+    assert (row.stopped, row.clearance_min) == (expected.stopped, expected.clearance_min)
+    assert row.closest_pair == expected.closest_pair
+
+
+def test_a_log_has_solids_and_closest_points(log):
+    scenario, found = log
+    check_log(found)
+    n, bodies = scenario.joints, len(scenario.arm.bodies)
+    assert found["solids"].shape == (bodies + 4, 16)
+    assert found["carriers"].tolist() == [*scenario.arm.bodies.links, n + 1, n + 1, n + 2, n + 1]
+    gap = np.linalg.norm(found["closest"][:, 0] - found["closest"][:, 1], axis=1)
+    np.testing.assert_allclose(gap, found["clearance"][found["frame"]], atol=1e-6)
+    ball = scenario.obstacle_rows(61)[1:, 2, 9:12]
+    np.testing.assert_allclose(found["carrier_frames"][:, n + 2, 9:], ball[found["frame"]], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+def test_a_log_without_one_of_them_is_damaged(log, name):
+    with pytest.raises(ValueError, match="all or none of the arrays clearance, solids"):
+        check_log({key: values for key, values in log[1].items() if key != name})
+
+
+def test_a_log_with_a_carrier_that_is_not_there_is_damaged(log):
+    with pytest.raises(ValueError, match="numbers below 10 in the array carriers"):
+        check_log(log[1] | {"carriers": log[1]["carriers"] + 5})
+
+
+def test_a_series_has_surfaces_in_the_frames_that_carry_them(log):
+    scenario, found = log
+    series = thinned(found, BUDGET)
+    arrays = {name: decoded(values) for name, values in series["arrays"].items()}
+    surface, triangles = arrays["surface"], arrays["triangles"].astype(int)
+    assert triangles.max() == len(surface) - 1
+    carriers = surface[triangles[:, 0], 3]
+    assert (carriers[: series["of_bodies"]] <= scenario.joints).all()
+    assert (carriers[series["of_bodies"] :] > scenario.joints).all()
+    ball = surface[surface[:, 3] == scenario.joints + 2, :3]
+    np.testing.assert_allclose(np.linalg.norm(ball, axis=1), 0.09, rtol=1e-6)
+    assert arrays["frames"].shape == (len(arrays["time"]), 12 * 10)
+    few = decoded(thinned(found, 1)["arrays"]["clearance"])
+    assert few.min() == np.float32(found["clearance"].min())
+    usual = {key: values for key, values in found.items() if key not in CONTACTS}
+    assert not {"surface", "clearance"} & thinned(usual, BUDGET)["arrays"].keys()

@@ -1,0 +1,75 @@
+"""Paths beside obstacles: starts that are clear, and what is said where none leads along."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.paths import retime, survey
+from baselines.paths.motion import ideal
+from baselines.paths.starts import starts
+from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles import Box
+from ikgym.solids import closest
+from tests.bodied import AROUND, POST, crowd
+
+
+def distances(scenario, q):
+    return closest(scenario.arm, q, scenario.obstacle_rows(1), scenario.surroundings.checked).distances
+
+
+def test_starts_are_clear():
+    free = crowd(None, (AROUND[0],))
+    every = starts(ideal(free))
+    elbow = free.arm.joint_points(every[0])[3, 1]
+    scenario = free.replace(obstacles=[*free.obstacles, Box("beam", elbow, [0.1, 0.1, 0.1])])
+    assert (distances(scenario, every) <= 0.0).any()
+    found = starts(ideal(scenario))
+    assert len(found) > 1
+    assert (distances(scenario, found) > 0.0).all()
+    best = survey(scenario).best
+    assert best.whole
+    assert best.contact.clearance > 0.0
+    assert not best.contact.touched
+    driven = retime(survey(scenario)).scenario
+    assert driven.obstacles == scenario.obstacles
+    assert baselines.track(driven, "qp").position_error.max() < 1e-3
+
+
+def test_the_clearance_is_that_of_the_motion():
+    scenario = crowd(None, AROUND)
+    best = survey(scenario).best
+    q = baselines.track(scenario.replace(start=best.start), "qp").q
+    found = closest(scenario.arm, q, scenario.obstacle_rows(len(q) + 1)[1:], scenario.surroundings.checked)
+    assert best.contact.clearance == pytest.approx(found.distances.min(), abs=1e-4)
+    assert best.contact.time == pytest.approx(scenario.dt * (1 + found.distances.argmin()), abs=0.05)
+
+
+def test_a_path_that_no_start_leads_along_clear():
+    scenario = crowd(None, (AROUND[0], POST.replace(position=[0.52, 0.13, 0.3], size=[0.1, 0.1, 0.5])))
+    found = survey(scenario)
+    assert not found.best.whole
+    assert not found.drivable
+    assert found.best.contact.touched
+    body, other = found.best.contact.pair
+    assert other == "post"
+    message = f"no start leads along all of it clear. In the farthest '{body}' and 'post' touch at {found.best.contact.time:.3g} s"
+    with pytest.raises(InvalidInputError, match=message):
+        retime(found)
+    tracking = baselines.track(scenario.replace(start=found.best.start), "qp")
+    moved = np.flatnonzero(np.abs(tracking.qdot).max(axis=1) > 0.0)
+    assert scenario.dt * moved[-1] == pytest.approx(found.best.contact.time, abs=0.3)
+
+
+def test_a_first_pose_that_is_not_clear():
+    position = crowd().frames(crowd().trajectory, 1)[0, 9:]
+    scenario = crowd(None, (Box("block", position, [0.1, 0.1, 0.1]),))
+    with pytest.raises(InvalidInputError, match=r"touches nothing, got none among \d+; .* and 'block' overlap by"):
+        survey(scenario)
+
+
+def test_without_collisions_nothing_is_said():
+    scenario = ikgym.scenarios.get("panda-circle")
+    assert all(branch.contact is None for branch in survey(scenario).branches)
