@@ -105,12 +105,12 @@ def _middlemost(arm: Arm, q: FloatArray) -> FloatArray:
 
 
 def _distinct(arm: Arm, known: FloatArray, q: FloatArray, most: int) -> FloatArray:
-    """Known postures and others that differ from them, each the farthest from those before. Shape (N, n)."""
+    """Known postures, or the first, and others that differ from them, each the farthest from those before. (N, n)."""
     size = np.where(arm.prismatic, arm.reach(np.zeros(arm.joints)) or 1.0, 1.0)
-    chosen = list(known)
+    chosen = list(known) or list(q[:1])
     while len(chosen) < most and len(q):
         distance = np.min([np.abs((q - one) / size).max(axis=1) for one in chosen], axis=0)
         if distance.max() < APART:
             break
         chosen.append(q[np.argmax(distance)])
-    return np.array(chosen)
+    return np.array(chosen).reshape(-1, arm.joints)
