@@ -140,7 +140,7 @@ class Capsule(Obstacle):
         """See :meth:`Obstacle.numbers`."""
         along = self.end - self.start
         length = float(np.linalg.norm(along))
-        rotation = IDENTITY if length == 0.0 else _towards(along / length)
+        rotation = IDENTITY if length == 0.0 else towards(along / length)
         return _row(rotation, 0.5 * (self.start + self.end), np.array([0.0, 0.0, 0.5 * length]), self.radius)
 
 
@@ -211,7 +211,7 @@ class HalfSpace(Obstacle):
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""
         normal = self.normal / np.linalg.norm(self.normal)
-        return _row(_towards(normal), self.position, np.full(3, -1.0), 0.0)
+        return _row(towards(normal), self.position, np.full(3, -1.0), 0.0)
 
 
 #: The kinds of obstacles by their names in scenario files.
@@ -222,10 +222,9 @@ def _row(rotation: FloatArray, position: FloatArray, half: FloatArray, radius: f
     return np.concatenate([np.ravel(rotation), position, half, [radius]])
 
 
-def _towards(direction: FloatArray) -> FloatArray:
-    """A rotation whose third axis is a unit vector."""
-    other = np.zeros(3)
-    other[np.argmin(np.abs(direction))] = 1.0
+def towards(direction: FloatArray) -> FloatArray:
+    """Rotations whose third axes are unit vectors, of shapes (..., 3, 3) and (..., 3)."""
+    other = np.eye(3)[np.argmin(np.abs(direction), axis=-1)]
     first = np.cross(other, direction)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(direction, first), direction])
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(direction, first), direction], axis=-1)
