@@ -168,9 +168,7 @@ class Scenario(Frozen, Reference):
         Returns:
             Shape (k, o, 16), or (1, o, 16) where none moves.
         """
-        along = [
-            one.along(self.times(steps), self.model).reshape(-1, one.count, OBSTACLE) for one in self.obstacles
-        ]
+        along = [one.along(self.times(steps), self.model).reshape(-1, one.count, OBSTACLE) for one in self.obstacles]
         rows = max(map(len, along), default=1)
         parts = [np.broadcast_to(numbers, (rows, *numbers.shape[1:])) for numbers in along]
         return np.concatenate([np.empty((rows, 0, OBSTACLE)), *parts], axis=1)
