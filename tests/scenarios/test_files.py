@@ -7,6 +7,7 @@ import typing
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -205,6 +206,21 @@ def test_an_arm_from_a_urdf_is_a_reference_to_it(urdf, where, tmp_path, monkeypa
     read = load("moved/scenarios/mine.toml")
     assert identical(fields(read), fields(scenario))
     assert fingerprint(read) == fingerprint(scenario)
+
+
+def test_bodies_from_meshes_are_read_from_them_again(urdf, tmp_path):
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(urdf.with_name("c.stl"))
+    geometry = '<collision><geometry><mesh filename="c.stl"/></geometry></collision>'
+    urdf.write_text(PAIR.replace("<link name='c'/>", f"<link name='c'>{geometry}</link>"))
+    scenario, file = on_urdf(urdf, meshes=True), tmp_path / "mine.toml"
+    assert scenario.arm.bodies.names == ("c",)
+    scenario.save(file)
+    assert tomllib.loads(file.read_text())["arm"] == {"name": "r2", "urdf": "arms/two.urdf", "meshes": True}
+    assert identical(fields(load(file)), fields(scenario))
+    urdf.with_name("c.stl").unlink()
+    scenario.save(file)
+    assert "urdf" not in tomllib.loads(file.read_text())["arm"]
+    assert identical(fields(load(file)), fields(scenario))
 
 
 def test_what_a_urdf_has_not_is_added(urdf, tmp_path):
