@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.outcome import OBSERVED, SOMETIMES
+from ikgym.kernels.bodies import OBSTACLE
+from ikgym.kernels.outcome import OBSERVED
 from ikgym.scenarios import Preview
 from ikgym.scenarios.preview import furthest
 from ikgym.simulator import Observation
@@ -219,7 +220,7 @@ class ObservationReader:
         )
 
     def extras(self, observation: Observation, rows: int, single: bool) -> Parts:
-        """Ages of measurements and past commands, None where the observation has none.
+        """Ages of measurements, past commands and obstacles, None where the observation has none.
 
         Args:
             observation: As the environment gives it.
@@ -227,11 +228,15 @@ class ObservationReader:
             single: Whether it has no row axis.
 
         Raises:
-            InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0.
+            InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0; or the obstacles are
+                absent where the policy needs them.
         """
         n, lead = self._problem.model.joints, () if single else (rows,)
-        tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n)
-        return [_extra(observation, key, lead, tail) for key, tail in zip(SOMETIMES, tails, strict=True)]
+        around = self._problem.surroundings
+        tails: dict[str, tuple[int | None, ...]]
+        tails = {"q_age": (1,), "pose_age": (1,), "commands": (None, n)}
+        tails["obstacles"] = (None if around is None else len(around.boxes), OBSTACLE)
+        return [_extra(observation, key, lead, tail) for key, tail in tails.items()]
 
 
 def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tuple[int | None, ...]) -> Any:
