@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.bodies import OBSTACLE
-from ikgym.kernels.outcome import OBSERVED
+from ikgym.kernels.outcome import OBSERVED, OBSTACLE, SOMETIMES
 from ikgym.scenarios import Preview
 from ikgym.scenarios.preview import furthest
 from ikgym.simulator import Observation
@@ -228,15 +227,11 @@ class ObservationReader:
             single: Whether it has no row axis.
 
         Raises:
-            InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0; or the obstacles are
-                absent where the policy needs them.
+            InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0.
         """
         n, lead = self._problem.model.joints, () if single else (rows,)
-        around = self._problem.surroundings
-        tails: dict[str, tuple[int | None, ...]]
-        tails = {"q_age": (1,), "pose_age": (1,), "commands": (None, n)}
-        tails["obstacles"] = (None if around is None else len(around.boxes), OBSTACLE)
-        return [_extra(observation, key, lead, tail) for key, tail in tails.items()]
+        tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n), (None, OBSTACLE)
+        return [_extra(observation, key, lead, tail) for key, tail in zip(SOMETIMES, tails, strict=True)]
 
 
 def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tuple[int | None, ...]) -> Any:

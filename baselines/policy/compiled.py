@@ -30,7 +30,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     sees_extras: ClassVar[bool] = False
     #: The kernel.
     step: ClassVar[Callable[..., None]]
-    #: The kernel among bodies, with the numbers of :meth:`numbers_among`; None for a policy that takes no notice of them.
+    #: The kernel among bodies, with the numbers of :meth:`numbers_among`; None for a policy that is blind to them.
     step_among: ClassVar[Callable[..., None] | None] = None
 
     def __post_init__(self) -> None:
@@ -111,13 +111,11 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
 
     def _told(self, parts: Parts, numbers: tuple[Any, ...]) -> tuple[Parts, tuple[Any, ...]]:
         """The five arrays of an observation, and the numbers with the obstacles that it shows."""
-        shown = parts[-1]
-        if shown is None:
-            raise InvalidInputError(
-                f"observation: {self.name} needs the obstacles of this scenario, expected the key 'obstacles', "
-                f"got none."
-            )
-        return parts[: len(OBSERVED)], (*numbers[:-1], shown.reshape(-1, *numbers[-1].shape[1:]))
+        shown, expected = parts[-1], numbers[-1].shape[1:]
+        if shown is None or shown.shape[-2:] != expected:
+            got = "none" if shown is None else shown.shape
+            raise InvalidInputError(f"observation['obstacles']: {self.name} expects shape {expected}, got {got}.")
+        return parts[: len(OBSERVED)], (*numbers[:-1], shown.reshape(-1, *expected))
 
     @functools.cached_property
     def _kernel(self) -> tuple[Any, FloatArray, tuple[Any, ...], int]:

@@ -73,8 +73,8 @@ class Batch(NamedTuple):
         pose_age: The same of the pose. Shape (B, 1).
         commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
             observed. Shape (B, h, n).
-        obstacles: The obstacles after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`; None where they
-            are not observed. Shape (B, o, 16).
+        obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`;
+            None where they are always the same. Shape (B, o, 16).
     """
 
     q: FloatArray

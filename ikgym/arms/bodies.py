@@ -21,8 +21,12 @@ class Neighbour(Protocol):
     def ignored(self) -> Sequence[str]:
         """Names of bodies that may touch it."""
 
+    @property
+    def count(self) -> int:
+        """How many rows of numbers it has."""
+
     def numbers(self) -> FloatArray:
-        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`. Shape (16,)."""
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`. Shape (16,) or (count, 16)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -159,12 +163,13 @@ class Bodies(Frozen):
         Raises:
             UnknownNameError: An obstacle ignores a body that there is not.
         """
-        boxes = np.array([one.numbers() for one in obstacles]).reshape(-1, OBSTACLE)
-        checked = np.empty((len(obstacles), len(self)), dtype=np.bool_)
-        for row, one in zip(checked, obstacles, strict=True):
+        rows = [np.reshape(one.numbers(), (-1, OBSTACLE)) for one in obstacles]
+        boxes, checked = np.concatenate([np.empty((0, OBSTACLE)), *rows]), []
+        for one in obstacles:
             known_names("body", one.ignored, self.names)
-            row[:] = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
-        return Surroundings(boxes, checked)
+            meets = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
+            checked += [meets] * one.count
+        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(-1, len(self)))
 
 
 def _names(given: Any) -> tuple[str, ...]:

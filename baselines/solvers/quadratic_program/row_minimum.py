@@ -24,8 +24,8 @@ SLACK = 1e6
 def row_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     """The x that minimises ½ xᵀ H x - gᵀ x between bounds and with aᵢᵀ x >= bᵢ, see :func:`dual_minimum`.
 
-    Where no x in the box has all rows, the bounds of the variables hold. First each bᵢ is lowered to what the box allows
-    aᵢᵀ x alone, then all of them by the same amount, the smallest that will do.
+    Where no x in the box has all rows, the bounds of the variables hold. First each bᵢ is lowered to the largest aᵢᵀ x
+    in the box, then all of them by the same amount, the smallest that will do.
 
     Args:
         hessian: H, symmetric and positive definite. Shape (n, n).
