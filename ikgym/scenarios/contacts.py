@@ -11,9 +11,22 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import Outcome
 from ikgym.plant.contact import Contacts
 from ikgym.plant.contact_rows import contact_rows
+from ikgym.plant.rows import PlantRows
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory
 from ikgym.validation import BoolArray, FloatArray
+
+
+def plant_rows(scenario: Scenario, rows: int, commands: int) -> PlantRows:
+    """The plants of N arms, with bodies and obstacles where they can touch.
+
+    Args:
+        scenario: The scenario.
+        rows: N.
+        commands: h, the number of past commands shown.
+    """
+    contacts = contacts_of(scenario, rows) if scenario.collides else None
+    return PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, scenario.task.size, commands, contacts)
 
 
 def contacts_of(scenario: Scenario, rows: int) -> Contacts:
