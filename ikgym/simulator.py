@@ -19,7 +19,7 @@ from ikgym.memory import check_memory, of_rows
 from ikgym.options import take_actions
 from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
-from ikgym.plant.rows import checked_arm_seeds
+from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, first_states

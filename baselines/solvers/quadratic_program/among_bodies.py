@@ -122,7 +122,7 @@ def clearance_bounds(numbers, dt, hessian, weight, distances, gradients, count, 
         bounds[i] = -np.inf
         if change > 0.0:
             part = aside(factor, weight, gradients[i]) / ASIDE if usable else 0.0
-            share = (APPROACH + part * min(GENTLE * dt, APPROACH)) / (1.0 + part)
+            share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
             bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
 
 
