@@ -93,14 +93,16 @@ class QuadraticProgram(VelocityProgram):
 
     task_scaling: bool = parameter(False, flag)
     clearance: float = parameter(0.005, number, at_least=0.0)
-    influence: float = parameter(0.2, number, above=0.0)
-    repulsion: float = parameter(3.0, number, at_least=0.0)
+    influence: float = parameter(0.3, number, above=0.0)
+    repulsion: float = parameter(10.0, number, at_least=0.0)
 
     name: ClassVar[str] = "qp"
     step, step_among = qp_step, qp_step_among
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.among_bodies:
+            self.check_secondary_gain(self.repulsion, "repulsion")
         if self.influence <= self.clearance:
             raise InvalidInputError(
                 f"influence: expected a number above the clearance of {self.clearance:g} m, got {self.influence:g}."
