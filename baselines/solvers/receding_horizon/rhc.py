@@ -20,6 +20,7 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
+from baselines.solvers.receding_horizon.newton.bodies import clearance_of
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step
 from baselines.solvers.receding_horizon.newton.settings import PlanNumbers, PlanSettings, plain_settings
@@ -82,6 +83,7 @@ class RecedingHorizon(CompiledPolicy):
             in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
             score has no such term: smooth velocities have their price. 0 for none.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
+        margin: Least clearance at the knots of a plan, in [m], where bodies may not touch.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
@@ -99,6 +101,7 @@ class RecedingHorizon(CompiledPolicy):
     recovery_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
     rate_weight: float = parameter(0.0, number, at_least=0.0)
     tolerance: float = parameter(1e-7, number, above=0.0)
+    margin: float = parameter(1e-3, number, at_least=0.0)
 
     name: ClassVar[str] = "rhc"
     step = plan_step
@@ -135,13 +138,15 @@ class RecedingHorizon(CompiledPolicy):
             self.rate_weight,
             problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0),
         )
-        numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))
+        plain = plain_settings(problem.cost.parameters, settings)
+        numbers = PlanNumbers(model.chain.prismatic, *plain, clearance_of(problem, self.margin))
         object.__setattr__(self, "_numbers", numbers)
 
     @property
     def interior_point(self) -> bool:
-        """Whether plans are made by the interior point method: where accelerations are limited."""
-        return bool(np.isfinite(self.problem.model.acceleration_limit).any())
+        """Whether plans are made by the interior point method: where accelerations are limited or bodies may not touch."""
+        limited = np.isfinite(self.problem.model.acceleration_limit).any()
+        return bool(limited) or self.problem.surroundings is not None
 
     @property
     def preview(self) -> int:

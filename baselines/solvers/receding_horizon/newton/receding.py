@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.newton.clearance import keep_clear
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
@@ -71,14 +72,13 @@ def plan_step(model, numbers, seen, memory, answer):
     cost, settings = settings_of(numbers.numbers, numbers.integers)
     data = ProblemData(chain, kind, cost, model.dt, model.lower, model.upper, model.largest)
     knots, n, plans = settings.at.shape[0], model.unit.shape[0], memory.plans
-    workspace = plan_workspace(
-        kind, seen.nominal.shape[2], knots, n, plans.shape[2] // knots - n, settings.change_limit.shape[0] > 0
-    )
-    plan_batch(data, settings, seen, memory, answer, workspace)
+    limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n
+    workspace = plan_workspace(kind, seen.nominal.shape[2], knots, n, width, limited, numbers.clearance)
+    plan_batch(data, settings, seen, memory, answer, numbers.clearance, workspace)
 
 
 @uncounted
-def plan_batch(data, settings, observations, memory, answers, workspace):
+def plan_batch(data, settings, observations, memory, answers, clearance, workspace):
     """Plans one period for each of B arms; the settings are :class:`PlanSettings`, other arguments as above."""
     plans, counts = memory
     for row in range(observations.q.shape[0]):
@@ -96,12 +96,14 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
             settings.change_limit,
             braking,
             workspace.newton.errors[:0],  # policies know of no payload
+            clearance,
         )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
         kept = _first_velocity(problem, plans[row, 0], answers.qdot[row])
+        kept = keep_clear(clearance, problem, answers.qdot[row], workspace.newton.clearance) and kept
         count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
         answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
         answers.iterations[row] = made

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.receding_horizon.newton.bodies import Clearance
 from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import expanded
 
@@ -44,11 +45,13 @@ class PlanNumbers(NamedTuple):
         prismatic: Which joints are prismatic. Shape (n,).
         numbers: See :func:`plain_settings`.
         integers: See :func:`plain_settings`.
+        clearance: Bodies that must not touch; None where they may.
     """
 
     prismatic: npt.NDArray[np.bool_]
     numbers: Floats
     integers: Integers
+    clearance: Clearance | None
 
 
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
