@@ -94,6 +94,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `clipped` | whether the action left its box | bool |
     | `at_limit` | joints held back by a stop, by the velocity limit, by the acceleration limit; int64 (3,) | 1 |
     | `time` | time since the start | [s] |
+    | `clearance` | smallest signed distance between bodies; absent where the scenario has no collisions | [m] |
+    | `collision` | whether bodies have touched, and the arm stands still; absent likewise | bool |
 
     After a reset `info` is empty, but for `context`, float64 (c,), where the plant draws numbers from ranges, see
     :class:`ikgym.Plant`: -1 at the lower end of a range, 1 at the upper end. No policy of the benchmark sees it.
@@ -204,8 +206,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         steps = self._simulator.checked_steps(options.get("step"))
         super().reset(seed=seed)
         self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds, steps=steps)
-        self._step, self._ended = 0 if steps is None else int(steps[0]), False
+        self._ended = True  # until it is certain that the arm touches nothing
         out = self._simulator.observe()
+        self._step, self._ended = 0 if steps is None else int(steps[0]), False
         if self._pictures is not None:
             self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
         return observation(out, 0), {"context": self.context} if self.context.size else {}
@@ -223,7 +226,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 if self._step < 0
                 else f"The episode has ended after {self._step} steps: call reset() first."
             )
-        seen, (tracking, velocity, position, orientation, clipped), held = self._simulator.step_one(action)
+        seen, (tracking, velocity, position, orientation, clipped), held, met = self._simulator.step_one(action)
         self._step += 1
         info: dict[str, Any] = {
             "tracking_cost": tracking,
@@ -236,6 +239,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["clipped"] = clipped > 0.0
         info["at_limit"] = held
         info["time"] = self._step * self._dt
+        if met:
+            info["clearance"], info["collision"] = met[0], met[1] > 0.0
         if self._pictures is not None:
             self._pictures.add(position, orientation)
         lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps

@@ -21,6 +21,7 @@ from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.contacts import check_clear, contacts_of
 from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
 from ikgym.scenarios.motion_frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
@@ -58,7 +59,7 @@ class Simulator:
     ) -> None:
         joints, coordinates = scenario.joints, scenario.task.size
         commands = whole_number("commands", commands, at_least=0)
-        ideal, self._late = scenario.plant.ideal and not commands, scenario.plant.late
+        ideal, self._late = scenario.plant.ideal and not commands and not scenario.collides, scenario.plant.late
         self._action_shape = (joints,) if rows is None else (rows, joints)
         # One arm has no rows that do not step, whose outcome would have to be zero.
         self._new = np.empty if rows is None else np.zeros
@@ -68,7 +69,8 @@ class Simulator:
         self._nominal = frames_of_rows(scenario, rows, self.preview, memory, AT_ONCE)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
-            shown += more_size(joints, coordinates, commands)
+            obstacles = len(scenario.obstacles) if scenario.obstacles_shown else 0
+            shown += more_size(joints, coordinates, commands, obstacles)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
         check_memory(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
         self._shared = Constants(
@@ -90,12 +92,14 @@ class Simulator:
             scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
         plant = scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands
-        self._plant = None if ideal else PlantRows(*plant)
-        self._shape = (rows, joints, coordinates, len(self.preview), None if ideal else commands)
+        self._plant = None if ideal else PlantRows(*plant, contacts_of(scenario, rows) if scenario.collides else None)
+        self._shape = (rows, joints, coordinates, len(self.preview), *(() if ideal else (commands, obstacles)))
         self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
         self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
         # Places in the block of the parts of an observation: those always there, and the others with their shapes.
-        seen = observation(self._outcome(np.arange(self._count, dtype=np.float64)), 0)
+        numbered = self._outcome(np.arange(self._count, dtype=np.float64))
+        seen, met = observation(numbered, 0), (numbered.clearance, numbered.stopped) if scenario.collides else ()
+        self._met = [int(part[0]) for part in met]
         places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
         self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
         self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
@@ -183,6 +187,8 @@ class Simulator:
             out.pose[starting] = self.scenario.initial_pose
             if self._plant is not None:
                 self._plant.state.shown[starting] = self.scenario.initial_pose
+        if self._met:
+            check_clear(self.scenario, out, active, self._state.q)
         return out
 
     def step(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_] | None = None) -> Outcome:
@@ -205,11 +211,12 @@ class Simulator:
         self._run(active, out.numbers, moving=True)
         return out
 
-    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float], npt.NDArray[np.int64]]:
+    def step_one(self, action: npt.ArrayLike) -> tuple[Observation, list[float], npt.NDArray[np.int64], list[float]]:
         """:meth:`step` of the only arm, in less time.
 
         Returns:
-            The observation, without a row axis; costs, errors and whether the action was clipped; joints held back.
+            The observation, without a row axis; costs, errors and whether the action was clipped; joints held back;
+            where bodies can touch, the clearance in [m], and 1 for an arm that is stopped, else nothing.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)
@@ -228,7 +235,7 @@ class Simulator:
         for key, where, shape in self._more:
             seen[key] = numbers[where].reshape(shape)
         held = numbers[self._held].astype(np.int64) if self._limited else NONE_HELD.copy()
-        return seen, numbers[self._told].tolist(), held
+        return seen, numbers[self._told].tolist(), held, [float(numbers[place]) for place in self._met]
 
     def nominal_positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
@@ -292,7 +299,8 @@ class Simulator:
         if plant is None:
             self._constants: tuple[Any, ...] = *self.scenario.arm.chain, *self._shared, *cost, *state
         else:
-            self._constants = self._shared, cost, plant.drives, plant.sensors, plant.arms, state, plant.state
+            fixed = self._shared, cost, plant.drives, plant.sensors
+            self._constants = *fixed, plant.arms, state, plant.state, plant.contacts
         nominal, more = self._nominal, (state.frames, state.step)
         self._motions = (*nominal.arguments(), *more) if isinstance(nominal, MotionFrames) else ()
 

@@ -29,7 +29,8 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
 
     Returns:
         Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,); where sensors are slow or late
-        q_age (1,) and pose_age (1,); where commands are shown commands (h, n).
+        q_age (1,) and pose_age (1,); where commands are shown commands (h, n), and where obstacles
+        move or differ from episode to episode obstacles (o, 16).
 
     Raises:
         InvalidInputError: The preview is not valid.
@@ -47,6 +48,9 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
     if plant.late:
         ages["q_age"] = spaces.Box(0.0, float(max(plant.q_delay, 1)), (1,), np.float64)
         ages["pose_age"] = spaces.Box(0.0, float(scenario.steps), (1,), np.float64)
+    if scenario.obstacles_shown:
+        rows = scenario.obstacle_rows(scenario.steps + 2)
+        past["obstacles"] = _between(rows.min(axis=0), rows.max(axis=0))
     if commands:
         past["commands"] = _box(np.tile(scenario.largest_qdot, (commands, 1)))
     return spaces.Dict(
@@ -65,6 +69,10 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
 def _coordinate_bound(scenario: Scenario, reach: float) -> FloatArray:
     """Bounds of task coordinates: 1 for parts of a rotation, the reach for positions. Shape (m,)."""
     return SLACK * np.array([1.0] * (scenario.task.size - 3) + [reach] * 3)
+
+
+def _between(low: FloatArray, high: FloatArray) -> spaces.Box:
+    return spaces.Box(low - 1e-9, high + 1e-9, dtype=np.float64)
 
 
 def _box(bound: FloatArray) -> spaces.Box:

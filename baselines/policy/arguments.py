@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.outcome import OBSERVED, SOMETIMES
+from ikgym.kernels.outcome import OBSERVED, OBSTACLE, SOMETIMES
 from ikgym.scenarios import Preview
 from ikgym.scenarios.preview import furthest
 from ikgym.simulator import Observation
@@ -219,7 +219,7 @@ class ObservationReader:
         )
 
     def extras(self, observation: Observation, rows: int, single: bool) -> Parts:
-        """Ages of measurements and past commands, None where the observation has none.
+        """Ages of measurements, past commands and obstacles, None where the observation has none.
 
         Args:
             observation: As the environment gives it.
@@ -230,7 +230,7 @@ class ObservationReader:
             InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0.
         """
         n, lead = self._problem.model.joints, () if single else (rows,)
-        tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n)
+        tails: tuple[tuple[int | None, ...], ...] = (1,), (1,), (None, n), (None, OBSTACLE)
         return [_extra(observation, key, lead, tail) for key, tail in zip(SOMETIMES, tails, strict=True)]
 
 

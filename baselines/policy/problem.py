@@ -73,6 +73,8 @@ class Batch(NamedTuple):
         pose_age: The same of the pose. Shape (B, 1).
         commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
             observed. Shape (B, h, n).
+        obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`;
+            None where they are always the same. Shape (B, o, 16).
     """
 
     q: FloatArray
@@ -83,6 +85,7 @@ class Batch(NamedTuple):
     q_age: FloatArray | None = None
     pose_age: FloatArray | None = None
     commands: FloatArray | None = None
+    obstacles: FloatArray | None = None
 
 
 class Solution(NamedTuple):

@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.kernels.jit import inlined, kernel, uncounted
+from ikgym.kernels.outcome import OBSTACLE as OBSTACLE
 from ikgym.kernels.segments import into_box, segment_box, segment_plane, segment_segment
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-# Numbers of an obstacle: rotation (9), position (3), half edges (3), radius; numbers of a placed body: start, end,
-# middle.
-OBSTACLE, PLACED = 16, 9
+# Numbers of a placed body: start, end, middle.
+PLACED = 9
 
 
 class Shapes(NamedTuple):

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
+#: Numbers of an obstacle, see :class:`ikgym.kernels.bodies.Surroundings`.
+OBSTACLE = 16
 
 
 class Outcome(NamedTuple):
@@ -31,6 +33,12 @@ class Outcome(NamedTuple):
         commands: The last h commands within the velocity limit, newest first, in [rad/s] or [m/s]. Shape (N, h, n).
         true_q: Joint coordinates in [rad] or [m]. Shape (N, n).
         true_pose: Task coordinates. Shape (N, m).
+        clearance: Smallest signed distance between bodies in [m]; infinite where nothing can meet. Shape (N,).
+        stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (N,).
+        pair: The nearest pair: a body, and another body or the number of bodies plus that of an obstacle; the pair that
+            touched at the step of a stop; -1 where nothing can meet. Shape (N, 2).
+        obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`.
+            Shape (N, o, 16), or (N, 0, 16) where they are always the same.
     """
 
     numbers: Floats
@@ -50,6 +58,10 @@ class Outcome(NamedTuple):
     commands: Floats
     true_q: Floats
     true_pose: Floats
+    clearance: Floats
+    stopped: Floats
+    pair: Floats
+    obstacles: Floats
 
 
 #: The observation, see :func:`observation`.
@@ -57,7 +69,7 @@ Observation = dict[str, Floats]
 #: Its keys in all scenarios.
 OBSERVED = ("q", "qdot", "pose", "nominal", "remaining")
 #: Its keys where there is something to show.
-SOMETIMES = ("q_age", "pose_age", "commands")
+SOMETIMES = ("q_age", "pose_age", "commands", "obstacles")
 
 
 def observation(out: Outcome, row: int | None = None) -> Observation:
@@ -66,27 +78,35 @@ def observation(out: Outcome, row: int | None = None) -> Observation:
     return {key: getattr(out, key) if row is None else getattr(out, key)[row] for key in keys}
 
 
-def outcome(numbers: Floats, rows: int, n: int, m: int, p: int, h: int | None = None, *, late: bool = False) -> Outcome:
+def outcome(
+    numbers: Floats, rows: int, n: int, m: int, p: int, h: int | None = None, o: int = 0, *, late: bool = False
+) -> Outcome:
     """The parts of an outcome as views of one block of numbers, as each step fills a fresh one.
 
     One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
 
     Args:
-        numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m),) where the
-            plant is not ideal.
+        numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m + 4 + 16 o),)
+            where the plant is not ideal or bodies can touch.
         rows: N.
         n: Joints of the arm.
         m: Task coordinates.
         p: Steps ahead that are shown.
         h: Commands that are shown; None where the plant is ideal, and what is measured is what is true.
+        o: Obstacles that are shown.
         late: Whether what is measured may be of an earlier step, so that its age is shown.
     """
     shown = parts(numbers, rows, n, m, p)
     nothing = numbers[:0].reshape(rows, 0)
     if h is None:
-        return Outcome._make((numbers, *shown, nothing, nothing, nothing.reshape(rows, 0, n), shown[0], shown[2]))
-    *ages, commands, q, pose = more_parts(numbers[rows * size(n, m, p) :], rows, n, m, h)
-    return Outcome._make((numbers, *shown, *(ages if late else (nothing, nothing)), commands, q, pose))
+        empty = nothing, nothing, nothing.reshape(rows, 0, n)
+        unknown = nothing, nothing, nothing, nothing.reshape(rows, 0, OBSTACLE)
+        return Outcome._make((numbers, *shown, *empty, shown[0], shown[2], *unknown))
+    *ages, commands, q, pose, clearance, stopped, pair, obstacles = more_parts(
+        numbers[rows * size(n, m, p) :], rows, n, m, h, o
+    )
+    measured = (*(ages if late else (nothing, nothing)), commands)
+    return Outcome._make((numbers, *shown, *measured, q, pose, clearance, stopped, pair, obstacles))
 
 
 def size(n: int, m: int, p: int) -> int:
@@ -94,9 +114,9 @@ def size(n: int, m: int, p: int) -> int:
     return 2 * n + m + p * m + 9
 
 
-def more_size(n: int, m: int, h: int) -> int:
-    """Numbers that a row shows besides where the plant is not ideal."""
-    return 2 + h * n + n + m
+def more_size(n: int, m: int, h: int, o: int) -> int:
+    """Numbers that a row shows besides where the plant is not ideal, or bodies can touch."""
+    return 2 + h * n + n + m + 4 + OBSTACLE * o
 
 
 def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, ...]:
@@ -121,15 +141,21 @@ def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, .
     )
 
 
-def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int) -> tuple[Floats, ...]:
-    """The parts of an outcome that are there where the plant is not ideal, see :func:`outcome`."""
+def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> tuple[Floats, ...]:
+    """The parts of an outcome that are there where the plant is not ideal or bodies can touch, see :func:`outcome`."""
     commands = 2 * rows
     true_q = commands + rows * h * n
     true_pose = true_q + rows * n
+    clearance = true_pose + rows * m
+    obstacles = clearance + 4 * rows
     return (
         numbers[:rows].reshape(rows, 1),
         numbers[rows:commands].reshape(rows, 1),
         numbers[commands:true_q].reshape(rows, h, n),
         numbers[true_q:true_pose].reshape(rows, n),
-        numbers[true_pose : true_pose + rows * m].reshape(rows, m),
+        numbers[true_pose:clearance].reshape(rows, m),
+        numbers[clearance : clearance + rows],
+        numbers[clearance + rows : clearance + 2 * rows],
+        numbers[clearance + 2 * rows : obstacles].reshape(rows, 2),
+        numbers[obstacles : obstacles + rows * o * OBSTACLE].reshape(rows, o, OBSTACLE),
     )

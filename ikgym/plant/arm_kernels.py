@@ -127,13 +127,18 @@ def _draw_arm(spread, key, row, loaded, calibration, load, arms):
     _shift(of_links, n, calibration * spread.link, spread.tool[which], tool)
     _copy(spread.tool_rotation[which], tool_rotation)
     for j in range(n):
-        zero = 0.0
-        if spread.zero[j] != 0.0:
-            zero = calibration * spread.zero[j] * normal(of_zeros, np.uint64(j))
-        if loaded == 1:
-            zero += load * spread.payload[j]
+        zero = zero_of(spread, of_zeros, j, loaded, calibration, load)
         if zero != 0.0:
             _begin_at(j, zero, spread.prismatic, offsets, axes, tool, tool_rotation)
+
+
+@inlined
+def zero_of(spread, of_zeros, j, loaded, calibration, load):
+    """The zero of a joint, with the payload or without it."""
+    zero = 0.0
+    if spread.zero[j] != 0.0:
+        zero = calibration * spread.zero[j] * normal(of_zeros, np.uint64(j))
+    return zero + load * spread.payload[j] if loaded == 1 else zero
 
 
 @inlined
@@ -246,16 +251,16 @@ def _begin_at(j, zero, prismatic, offsets, axes, tool, tool_rotation):
     s, half = math.sin(zero), math.sin(0.5 * zero)
     v = 2.0 * half * half
     for i in range(j + 1, offsets.shape[0]):
-        _turn(axis, s, v, offsets[i])
-        _turn(axis, s, v, axes[i])
+        turn(axis, s, v, offsets[i])
+        turn(axis, s, v, axes[i])
         _to_unit(axes[i])
-    _turn(axis, s, v, tool)
+    turn(axis, s, v, tool)
     for c in range(3):
-        _turn(axis, s, v, tool_rotation[:, c])
+        turn(axis, s, v, tool_rotation[:, c])
 
 
 @inlined
-def _turn(axis, s, v, vector):
+def turn(axis, s, v, vector):
     """Turns a vector in place, by Rodrigues' formula with the sine and 1 − the cosine of the angle."""
     x, y, z = vector[0], vector[1], vector[2]
     ax, ay, az = axis

@@ -10,8 +10,10 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
+from ikgym.kernels.bodies import Shapes
 from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
 from ikgym.plant.checks import PerJoint
+from ikgym.plant.contact import Contacts, turn_bodies
 from ikgym.plant.plant import WHOLE, Plant
 from ikgym.plant.severity import scaled
 from ikgym.validation import FloatArray, whole_number
@@ -88,6 +90,28 @@ class Draws:
             out: Receives the arms.
         """
         draw_arms(self._spread, keys, rows, numbers.calibration, numbers.load, out)
+
+    def bodies(
+        self,
+        keys: Keys,
+        rows: npt.NDArray[np.int64],
+        numbers: Numbers,
+        axes: FloatArray,
+        shapes: Shapes,
+        contacts: Contacts,
+    ) -> None:
+        """Turns the bodies of some rows by the zeros of their joints.
+
+        Args:
+            keys: One a row. Shape (k,).
+            rows: The numbers of the rows. Shape (k,).
+            numbers: What the keys draw from ranges.
+            axes: Axes of the arms that were drawn. Shape (N, 2, n, 3).
+            shapes: The bodies of the arm of the data sheet.
+            contacts: Receives the bodies.
+        """
+        factors, ends = (numbers.calibration, numbers.load), (contacts.starts, contacts.ends)
+        turn_bodies(self._spread, keys, rows, *factors, axes, shapes.links, (shapes.starts, shapes.ends), ends)
 
     def numbers(self, keys: Keys) -> tuple[Numbers, FloatArray]:
         """What is drawn from ranges, and the contexts. Shapes (k,), (k, c)."""

@@ -13,6 +13,7 @@ from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
 from ikgym.plant.arm_kernels import stream_rows
 from ikgym.plant.checks import PerJoint
+from ikgym.plant.contact import Contacts
 from ikgym.plant.draw import Draws, arm_key, episode_key
 from ikgym.plant.plant import Plant
 from ikgym.plant.sensor_kernels import STREAMS
@@ -58,10 +59,21 @@ class PlantRows:
         rows: N.
         coordinates: m, of the task.
         commands: h, the number of past commands shown.
+        contacts: Bodies and obstacles; None where touching does not matter.
     """
 
-    def __init__(self, plant: Plant, arm: Arm, dt: float, rows: int, coordinates: int, commands: int) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        arm: Arm,
+        dt: float,
+        rows: int,
+        coordinates: int,
+        commands: int,
+        contacts: Contacts | None = None,
+    ) -> None:
         self._plant, self._dt, n = plant, dt, arm.joints
+        self.contacts, self._bodies = contacts, arm.bodies.shapes
         self._draws = Draws(plant, arm)
 
         def every_joint(value: PerJoint) -> FloatArray:
@@ -127,6 +139,9 @@ class PlantRows:
         of_arms = np.array(arm_keys, dtype=np.uint64)
         numbers, self.context[rows] = self._draws.numbers(of_arms)
         self._draws.arms(of_arms, rows, numbers, self.arms)
+        if self.contacts is not None:
+            self.contacts.stopped[rows] = False
+            self._draws.bodies(of_arms, rows, numbers, self.arms.axes, self._bodies, self.contacts)
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
         self.state.delay[rows] = numbers.command_delay
         for name in ("pose_noise", "pose_rotation_noise", "pose_every"):

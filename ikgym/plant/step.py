@@ -10,12 +10,13 @@ import numpy.typing as npt
 from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
-from ikgym.kernels.outcome import more_parts, parts, size
+from ikgym.kernels.outcome import OBSTACLE, more_parts, more_size, parts, size
 from ikgym.kernels.simulation import Floats, Integers, commanded, show_row
+from ikgym.plant.contact import measure, place_of_boxes, touches
 from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
 
-_parts, _more_parts, _size = expanded(parts), expanded(more_parts), inlined(size)
+_parts, _more_parts, _size, _more_size = expanded(parts), expanded(more_parts), inlined(size), inlined(more_size)
 
 
 class Drives(NamedTuple):
@@ -80,7 +81,7 @@ class PlantState(NamedTuple):
 
 
 @kernel
-def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, moving, start, stop):
+def step(constants, cost, drives, sensors, arms, state, plant, contacts, numbers, active, moving, start, stop):
     """Moves rows, and observes them, as :func:`ikgym.kernels.simulation.step` does.
 
     Args:
@@ -91,6 +92,7 @@ def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, 
         arms: The rows' own, an :class:`Arms`.
         state: A :class:`ikgym.kernels.simulation.State`, changed in place.
         plant: A :class:`PlantState`, changed in place.
+        contacts: A :class:`ikgym.plant.contact.Contacts`, changed in place; None where touching does not matter.
         numbers: The block of an outcome, written in place.
         active: The rows that are meant. Shape (N,).
         moving: Whether they move, or are observed where they are.
@@ -100,13 +102,14 @@ def step(constants, cost, drives, sensors, arms, state, plant, numbers, active, 
     rows, n = state.q.shape
     p, m = constants.preview.shape[0], plant.shown.shape[1]
     usual = rows * _size(n, m, p)
-    h = ((numbers.shape[0] - usual) // rows - 2 - n - m) // n
-    shown, more = _parts(numbers, rows, n, m, p), _more_parts(numbers[usual:], rows, n, m, h)
-    _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, active, moving, start, stop)
+    o = 0 if contacts is None else contacts.shown
+    h = ((numbers.shape[0] - usual) // rows - _more_size(n, m, 0, o)) // n
+    shown, more = _parts(numbers, rows, n, m, p), _more_parts(numbers[usual:], rows, n, m, h, o)
+    _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown, more, active, moving, start, stop)
 
 
 @uncounted
-def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, active, moving, start, stop):
+def _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown, more, active, moving, start, stop):
     """The rows of :func:`step`, with the parts of the outcome in two tuples."""
     q, qdot = state.q, state.qdot
     offsets, axes, tool, tool_rotation = arms.offsets, arms.axes, arms.tool, arms.tool_rotation
@@ -119,6 +122,9 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, act
         shown[9][row] = 0.0
         shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
         if moving:
+            if contacts is not None:
+                for j in range(n):
+                    contacts.before[row, j] = q[row, j]
             _drive(constants, drives, state, plant, row, shown[9], shown[10])
             state.step[row] += 1
         k = state.step[row]
@@ -126,6 +132,9 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, act
         chain = Chain(
             offsets[row, loaded], axes[row, loaded], drives.prismatic, tool[row, loaded], tool_rotation[row, loaded]
         )
+        if contacts is not None:
+            _meet(contacts, chain, row, loaded, k, moving, k == drives.payload_step, q, qdot, plant.drive)
+            _show_contacts(contacts, row, k, more)
         forward(chain, q[row], rotation, position)
         show_row(constants, cost, state, row, more[4][row], (rotation, position, nominal, error), shown)
         for j in range(n):
@@ -133,6 +142,39 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, shown, more, act
             more[3][row, j] = q[row, j]
         _recall(constants.limits, plant.commands, row, k, more[2])
         _sense(sensors, plant, constants.kind, row, k, q, rotation, position, shown, more)
+
+
+@inlined
+def _meet(contacts, chain, row, loaded, k, moving, loading, q, qdot, drive):
+    """Takes the motion of a row back in which bodies touch, and lets the arm stand still from then on."""
+    if not moving:
+        measure(contacts, chain, row, loaded, k, q[row])
+        return
+    before = contacts.before[row]
+    if not contacts.stopped[row]:
+        if loading:  # it has become another arm
+            measure(contacts, chain, row, loaded, k - 1, before)
+        if not touches(contacts, chain, row, loaded, k, q[row]):
+            return
+    first, second, touched = contacts.pair[row, 0], contacts.pair[row, 1], not contacts.stopped[row]
+    for j in range(q.shape[1]):
+        q[row, j], qdot[row, j], drive[row, j] = before[j], 0.0, 0.0
+    contacts.stopped[row] = True
+    measure(contacts, chain, row, loaded, k, q[row])
+    if touched:
+        contacts.pair[row, 0], contacts.pair[row, 1] = first, second
+
+
+@inlined
+def _show_contacts(contacts, row, k, more):
+    """Shows the clearance of a row, whether it is stopped, its nearest pair, and the obstacles that it shall see."""
+    more[5][row], more[6][row] = contacts.distance[row], contacts.stopped[row]
+    for c in range(2):
+        more[7][row, c] = contacts.pair[row, c]
+    table, at = place_of_boxes(contacts, row, k + 1)
+    for i in range(contacts.shown):
+        for c in range(OBSTACLE):
+            more[8][row, i, c] = contacts.boxes[table, at, i, c]
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.bodies import Surroundings
 from ikgym.memory import check_memory, gib
 from ikgym.obstacles import Obstacle
 from ikgym.plant import Plant
@@ -82,32 +81,6 @@ def obstacles(name: str, arm: Arm, given: Any, collisions: Any) -> tuple[Obstacl
     if matters and not len(arm.bodies):
         raise InvalidInputError(f"collisions of scenario {name!r}: expected an arm with bodies, {arm.name!r} has none.")
     return tuple(given)
-
-
-def clear(name: str, arm: Arm, obstacles: Sequence[Obstacle], around: Surroundings, q: FloatArray) -> None:
-    """Checks that an arm touches nothing at the start.
-
-    Args:
-        name: The scenario's.
-        arm: The arm.
-        obstacles: The obstacles.
-        around: The same, as kernels see them.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-
-    Raises:
-        InvalidInputError: It does; the message names the pair, and how to let it touch.
-    """
-    from ikgym.kernels.bodies import clearance_rows  # scenarios without bodies need none of its kernels
-
-    distance, pair = np.empty(1), np.empty((1, 2), dtype=np.int64)
-    clearance_rows(arm.chain, arm.bodies.shapes, *around, q[None], distance, pair)
-    if distance[0] <= 0.0:
-        first, second = ((*arm.bodies.names, *(one.name for one in obstacles))[i] for i in pair[0].tolist())
-        raise InvalidInputError(
-            f"Start of scenario {name!r}: expected an arm that touches nothing, got {first!r} and {second!r} with "
-            f"{1e3 * distance[0]:.3g} mm between them at q = {q.tolist()}. A pair that may touch is named by `ignored` "
-            "of the bodies or of the obstacle."
-        )
 
 
 def step_count(name: str, value: int, joints: int) -> int:

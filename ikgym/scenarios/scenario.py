@@ -106,8 +106,6 @@ class Scenario(Frozen, Reference):
         self._settle(obstacles=checks.obstacles(self.name, self.arm, self.obstacles, self.collisions))
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # raises if the arm cannot be there
-        if self.collides and not self.random and not self.plant.draws_arm:
-            self.check_clear(self.start_of())
         checks.check_cost(self.name, self.largest_step_cost(), self.steps)
 
     def replace(self, **changes: Any) -> Self:
@@ -176,17 +174,6 @@ class Scenario(Frozen, Reference):
         for i, numbers in enumerate(along):
             out[:, i] = numbers
         return out
-
-    def check_clear(self, q: FloatArray) -> None:
-        """Checks that the arm touches nothing at the start.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]. Shape (n,).
-
-        Raises:
-            InvalidInputError: It does; the message names the pair, and how to let it touch.
-        """
-        checks.clear(self.name, self.arm, self.obstacles, self.surroundings, q)
 
     @property
     def cut_off(self) -> float:
