@@ -11,6 +11,7 @@ from baselines.policy.problem import Problem
 from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE
 from ikgym.kernels.bodies import PLACED, Shapes
 from ikgym.kernels.jit import inner
+from ikgym.plant.contact_rows import sweep
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -105,15 +106,3 @@ def clearance_of(problem: Problem, margin: float) -> Clearance | None:
     return Clearance(
         model.bodies.shapes, around.boxes[None], around.checked, sweep(model, travel, 0.0), margin, margin + INFLUENCE
     )
-
-
-def sweep(arm, travel, longer):  # TODO: the plant's own, once merged
-    bodies = arm.bodies
-    ends = np.maximum(np.linalg.norm(bodies.starts, axis=1), np.linalg.norm(bodies.ends, axis=1))
-    lengths = np.linalg.norm(arm.offsets, axis=1) + np.where(arm.prismatic, travel, 0.0) + longer
-    out = np.zeros((len(bodies), arm.joints))
-    for body, link in enumerate(bodies.links):
-        for joint in range(link):
-            own = travel[joint] if arm.prismatic[joint] else 0.0
-            out[body, joint] = 1.0 if arm.prismatic[joint] else own + lengths[joint + 1 : link].sum() + ends[body]
-    return out
