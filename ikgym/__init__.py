@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-from ikgym import arms, exceptions, problems, rl, scenarios, tasks, trajectories
+from ikgym import arms, exceptions, obstacles, problems, rl, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.env import RedundantIKEnv
@@ -29,6 +29,7 @@ __all__ = [
     "TrackingCost",
     "arms",
     "exceptions",
+    "obstacles",
     "problems",
     "rl",
     "rotations",

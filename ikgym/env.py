@@ -56,6 +56,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
        some.
     5. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
+    6. Where the scenario has collisions, a motion in which bodies touch is not made: the arm stands still for the rest
+       of the episode (protective stop). The path goes on, and costs.
 
     An ideal plant without limits applies the command. `info["at_limit"]` counts the joints that were held back, by
     more than a millionth of the scenario's `velocity_limit`, which exceeds the rounding of float32.
@@ -73,11 +75,13 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `q_age` | (1,) | steps since `q` was measured; where sensors are slow or late | 1 |
     | `pose_age` | (1,) | steps since `pose` was measured; where sensors are slow or late | 1 |
     | `commands` | (h, n) | the last h commands within the velocity limit, newest first; with `commands=h` | as `qdot` |
+    | `obstacles` | (o, 16) | obstacles after the coming step; where they move or are drawn | [m], rotation parts 1 |
 
     `q` and `pose` are the measurements of the scenario's plant; with an ideal plant they are exact.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives only those steps.
-    The nominal goes on past the end of the episode. All bounds are finite and true: they follow from the start,
-    the limits, the number of steps and the arm's reach.
+    A row of `obstacles` has a rotation, row by row, a position, half of the edges and a radius, see
+    :class:`ikgym.kernels.bodies.Surroundings`. The nominal goes on past the end of the episode. All bounds are finite
+    and true: they follow from the start, the limits, the number of steps and the arm's reach.
 
     ## Reward
     −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
@@ -94,8 +98,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `clipped` | whether the action left its box | bool |
     | `at_limit` | joints held back by a stop, by the velocity limit, by the acceleration limit; int64 (3,) | 1 |
     | `time` | time since the start | [s] |
-    | `clearance` | smallest signed distance between bodies; absent where the scenario has no collisions | [m] |
-    | `collision` | whether bodies have touched, and the arm stands still; absent likewise | bool |
+
+    Where the scenario has collisions, `clearance` is the smallest signed distance between bodies in [m], and
+    `collision` is true for an arm that stands still since bodies touched.
 
     After a reset `info` is empty, but for `context`, float64 (c,), where the plant draws numbers from ranges, see
     :class:`ikgym.Plant`: -1 at the lower end of a range, 1 at the upper end. No policy of the benchmark sees it.
@@ -114,7 +119,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     ## Episode end
     Truncated by the environment itself after the scenario's `steps`, also given by `spec.max_episode_steps`. Terminated
-    where the position error exceeds `lost_distance`, if there is one.
+    where the position error exceeds `lost_distance`, or bodies touch, if there is such a distance.
 
     Args:
         scenario: A scenario, or its name: a registered one, a file ending in `.toml`, or
@@ -243,7 +248,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             info["clearance"], info["collision"] = met[0], met[1] > 0.0
         if self._pictures is not None:
             self._pictures.add(position, orientation)
-        lost, over = self.lost_distance is not None and position > self.lost_distance, self._step == self._steps
+        ends, over = self.lost_distance is not None, self._step == self._steps
+        lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over
         return seen, -(tracking + velocity), lost, over, info
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import typing
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +21,15 @@ class Obstacle(Frozen, abc.ABC):
     name: str
     motion: Trajectory | None
     ignored: Sequence[str]
+    #: Whether it is drawn when an episode begins.
+    random: typing.ClassVar[bool] = False
+    #: How many rows of numbers it has.
+    count: int = 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its rows."""
+        return (self.name,)
 
     def _check(self) -> None:
         """Checks what all obstacles have."""
@@ -43,7 +53,10 @@ class Obstacle(Frozen, abc.ABC):
 
     @abc.abstractmethod
     def numbers(self) -> FloatArray:
-        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`, at its own place. Shape (16,)."""
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`, at its own place. Shape (16,).
+
+        One that has several rows gives all of them, in shape (count, 16).
+        """
 
     def along(self, times: FloatArray, model: Arm) -> FloatArray:
         """The numbers at some times; those of an obstacle at rest have a single row.

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import known_names, number, one_a_row, shortened, whole_number
+from ikgym.kernels.simulation import first_not_finite
+from ikgym.validation import BoolArray, FloatArray, known_names, number, one_a_row, shortened, whole_number
 
 
 def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequence[int | None]:
@@ -78,3 +79,32 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
         raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
     known_names("option of reset", options, known)
     return options
+
+
+def take_actions(actions: npt.ArrayLike, shape: tuple[int, ...], active: BoolArray, out: FloatArray) -> None:
+    """Checks actions, and takes them over.
+
+    Args:
+        actions: Joint velocities as fractions of the velocity limit.
+        shape: Their shape, (n,) or (N, n).
+        active: The rows that step. Shape (N,).
+        out: Receives them. Shape (N, n).
+
+    Raises:
+        InvalidInputError: They have a wrong shape or type, or one of an active row is not finite.
+    """
+    try:
+        raw = np.asarray(actions)
+    except ValueError:  # lists of different lengths
+        raw = np.asarray(None)
+    if raw.dtype.kind not in "fiub":
+        raise InvalidInputError(f"action: expected numbers of shape {shape}, got {shortened(actions)}.")
+    if raw.shape != shape:
+        raise InvalidInputError(f"action: expected shape {shape}, got {raw.shape}.")
+    out[:] = raw
+    bad = first_not_finite(out, active)
+    if bad >= 0:
+        where = f" of row {bad}" if len(out) > 1 else ""
+        raise InvalidInputError(
+            f"action{where}: expected finite numbers, got {out[bad].tolist()}. The state is as it was."
+        )

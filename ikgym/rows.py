@@ -105,6 +105,19 @@ def infos_of(out: Outcome, rows: BoolArray, made: npt.NDArray[np.int64], scenari
     return infos
 
 
+def lost_rows(out: Outcome, lost_distance: float | None) -> BoolArray:
+    """Rows that have lost their track, or whose bodies have touched; none without a distance. Shape (N,).
+
+    Args:
+        out: After a step.
+        lost_distance: In [m], None for never.
+    """
+    if lost_distance is None:
+        return np.zeros(len(out.position_error), dtype=np.bool_)
+    lost: BoolArray = out.position_error > lost_distance
+    return lost | (out.stopped > 0.0) if out.stopped.size else lost
+
+
 def last_observations(seen: Observation, rows: BoolArray) -> npt.NDArray[np.object_]:
     """One observation a row, in the layout of `final_obs`; None in the other rows.
 

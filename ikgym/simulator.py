@@ -10,24 +10,24 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.limits import limit_rows
-from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import motions, simulation
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
 from ikgym.memory import check_memory, of_rows
+from ikgym.options import take_actions
 from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.contacts import check_clear, contacts_of
+from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
 from ikgym.scenarios.motion_frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.nominal_frames import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
-from ikgym.validation import FloatArray, shortened, whole_number
+from ikgym.validation import FloatArray, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
@@ -43,10 +43,9 @@ class Simulator:
     Args:
         scenario: The tracking problem.
         rows: N, or None for one arm whose actions have no row axis.
-        preview: How many steps ahead the nominal coordinates are shown: an int p shows 1 … p, a sequence just
-            those.
-        memory: Most memory for the nominal frames of all rows, in bytes. Those of random episodes that would take
-            more are computed block by block on the way; a block is never shorter than the preview looks ahead.
+        preview: How many steps ahead the nominal coordinates are shown: 1 … p for an int p, or those of a sequence.
+        memory: Most memory for the nominal frames of all rows, in bytes. Those of random episodes that would take more
+            are computed block by block; a block is never shorter than the preview looks ahead.
         commands: How many of the last commands are shown.
 
     Raises:
@@ -69,7 +68,7 @@ class Simulator:
         self._nominal = frames_of_rows(scenario, rows, self.preview, memory, AT_ONCE)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
-            obstacles = len(scenario.obstacles) if scenario.obstacles_shown else 0
+            obstacles = len(scenario.surroundings.boxes) if scenario.obstacles_shown else 0
             shown += more_size(joints, coordinates, commands, obstacles)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
         check_memory(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
@@ -91,8 +90,7 @@ class Simulator:
             frames=self._nominal.allocate(),
             scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
-        plant = scenario.plant, scenario.arm, scenario.dt, rows, coordinates, commands
-        self._plant = None if ideal else PlantRows(*plant, contacts_of(scenario, rows) if scenario.collides else None)
+        self._plant = None if ideal else plant_rows(scenario, rows, commands)
         self._shape = (rows, joints, coordinates, len(self.preview), *(() if ideal else (commands, obstacles)))
         self._count, usual = rows * shown, rows * size(joints, coordinates, len(self.preview))
         self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
@@ -139,10 +137,13 @@ class Simulator:
         rows = np.flatnonzero(active)
         if len(rows) == 0:
             return
-        episodes = scenario.trajectory.samples([generators[row] for row in rows.tolist()])
+        own = [generators[row] for row in rows.tolist()]
+        episodes = scenario.trajectory.samples(own)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
         if self._plant is not None:
             self._plant.begin(rows, generators, arm_seeds, noise_seeds)
+            if scenario.draws_obstacles and self._plant.contacts is not None:
+                draw_obstacles(scenario, self._plant.contacts, rows, episodes, own)
         if starts is None:
             chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
             state.q[rows], state.qdot[rows] = first_states(scenario, self._nominal.point, episodes, steps, chains)
@@ -258,24 +259,7 @@ class Simulator:
 
     def _accept(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_]) -> None:
         """Takes actions over, if they are good, and prepares the active rows for their step."""
-        try:
-            raw = np.asarray(actions)
-        except ValueError:  # lists of different lengths
-            raw = np.asarray(None)
-        if raw.dtype.kind not in "fiub":
-            raise InvalidInputError(
-                f"action: expected numbers of shape {self._action_shape}, got {shortened(actions)}."
-            )
-        if raw.shape != self._action_shape:
-            raise InvalidInputError(f"action: expected shape {self._action_shape}, got {raw.shape}.")
-        accepted = self._state.actions
-        accepted[:] = raw
-        bad = simulation.first_not_finite(accepted, active)
-        if bad >= 0:
-            where = f" of row {bad}" if self.rows > 1 else ""
-            raise InvalidInputError(
-                f"action{where}: expected finite numbers, got {accepted[bad].tolist()}. The state is as it was."
-            )
+        take_actions(actions, self._action_shape, active, self._state.actions)
         if isinstance(self._nominal, NominalFrames) and self._nominal.in_blocks:
             rows = np.flatnonzero(active)
             self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)

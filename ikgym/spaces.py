@@ -49,8 +49,7 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
         ages["q_age"] = spaces.Box(0.0, float(max(plant.q_delay, 1)), (1,), np.float64)
         ages["pose_age"] = spaces.Box(0.0, float(scenario.steps), (1,), np.float64)
     if scenario.obstacles_shown:
-        rows = scenario.obstacle_rows(scenario.steps + 2)
-        past["obstacles"] = _between(rows.min(axis=0), rows.max(axis=0))
+        past["obstacles"] = _between(*scenario.obstacle_bounds())
     if commands:
         past["commands"] = _box(np.tile(scenario.largest_qdot, (commands, 1)))
     return spaces.Dict(

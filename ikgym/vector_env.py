@@ -19,7 +19,7 @@ from ikgym.env import OPTIONS, RedundantIKEnv, limited
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.kernels.outcome import Observation, Outcome, observation
 from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
-from ikgym.rows import ArmRow, Hinting, Infos, contexts, infos_of, last_observations
+from ikgym.rows import ArmRow, Hinting, Infos, contexts, infos_of, last_observations, lost_rows
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
@@ -196,7 +196,7 @@ class RedundantIKVectorEnv(
         rewards[waiting] = 0.0
         made = self._simulator.steps_made
         over = stepping & (made == self.scenario.steps)
-        lost = stepping & (out.position_error > (np.inf if self.lost_distance is None else self.lost_distance))
+        lost = stepping & lost_rows(out, self.lost_distance)
         ended = over | lost
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
         infos: Infos = {}

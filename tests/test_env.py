@@ -12,9 +12,12 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import ikgym
+from ikgym.arms.bodies import Bodies
 from ikgym.env import OBSERVED, REPORTED
 from ikgym.exceptions import ResetNeededError
 from ikgym.kernels.outcome import SOMETIMES
+from ikgym.obstacles import Sphere
+from ikgym.trajectories import StraightLine
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 from tests.spawning import random_env
@@ -47,13 +50,20 @@ def test_stable_baselines3_check_env(scenario):
     sb3_check_env(gym.wrappers.FlattenObservation(make(scenario)))
 
 
+def with_obstacle(scenario):
+    """An arm with a body, and an obstacle that moves."""
+    upright = [*np.eye(3).ravel(), 0.0, 0.0, 0.0]
+    arm = scenario.arm.replace(bodies=Bodies(["tool"], [scenario.joints], [[0, 0, 0]], radii=[0.01]))
+    return {"arm": arm, "obstacles": [Sphere("ball", [0, 0, 90], 0.1, motion=StraightLine(upright, upright, 1.0, 0.1))]}
+
+
 @pytest.mark.parametrize("scenario", ONE_A_TASK)
 def test_docstring_tables_are_the_spaces(scenario):
     env = make(scenario, preview=(1, 4, 9)).unwrapped
-    late = env.scenario.replace(plant=env.scenario.plant.replace(q_delay=1))
+    late = env.scenario.replace(plant=env.scenario.plant.replace(q_delay=1), **with_obstacle(env.scenario))
     shown = ikgym.RedundantIKEnv(late, preview=(1, 4, 9), commands=2).observation_space
     rows = dict(re.findall(r"\| `(\w+)` \| \(([^)]*)\) \|", ikgym.RedundantIKEnv.__doc__))
-    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "h": 2, "1": 1}
+    sizes = {"n": env.scenario.joints, "m": env.scenario.task.size, "p": 3, "h": 2, "1": 1, "o": 1, "16": 16}
     shapes = {key: tuple(sizes[s.strip()] for s in text.split(",") if s.strip()) for key, text in rows.items()}
     assert shapes == {key: space.shape for key, space in shown.spaces.items()}
     assert tuple(shapes) == (*OBSERVED, *SOMETIMES)

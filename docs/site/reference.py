@@ -16,6 +16,7 @@ PAGES: dict[str, dict[str, tuple[str, ...]]] = {
     "ikgym": {
         "ikgym": (),
         "ikgym.arms": (),
+        "ikgym.obstacles": (),
         "ikgym.tasks": (),
         "ikgym.trajectories": (),
         "ikgym.trajectories.paths": (),

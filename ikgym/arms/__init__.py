@@ -11,11 +11,12 @@ from collections.abc import Callable
 
 from ikgym.arms import catalogue
 from ikgym.arms.arm import Arm
+from ikgym.arms.bodies import Bodies
 from ikgym.arms.denavit_hartenberg import from_dh
 from ikgym.arms.urdf import Tip, from_urdf, tips
 from ikgym.registry import Registry
 
-__all__ = ["SHIPPED", "Arm", "Tip", "from_dh", "from_urdf", "get", "names", "register", "tips"]
+__all__ = ["SHIPPED", "Arm", "Bodies", "Tip", "from_dh", "from_urdf", "get", "names", "register", "tips"]
 
 _registry: Registry[Arm] = Registry("arm", Arm)
 for _name, _make in catalogue.read().items():

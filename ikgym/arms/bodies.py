@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Any, Protocol, Self
 
@@ -11,7 +12,17 @@ import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE, Shapes, Surroundings
-from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, known_names, read_only, shortened, whole_number
+from ikgym.validation import (
+    LARGEST,
+    FloatArray,
+    Frozen,
+    IntArray,
+    frozen_array,
+    known_names,
+    read_only,
+    shortened,
+    whole_number,
+)
 
 
 class Neighbour(Protocol):
@@ -21,8 +32,12 @@ class Neighbour(Protocol):
     def ignored(self) -> Sequence[str]:
         """Names of bodies that may touch it."""
 
+    @property
+    def count(self) -> int:
+        """How many rows of numbers it has."""
+
     def numbers(self) -> FloatArray:
-        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`. Shape (16,)."""
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`. Shape (16,) or (count, 16)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -130,8 +145,8 @@ class Bodies(Frozen):
                     f"link of body {name!r}: expected a number from 0, the base, to {joints}, the last, got {link}."
                 )
 
-    @property
-    def pairs(self) -> npt.NDArray[np.int64]:
+    @functools.cached_property
+    def pairs(self) -> IntArray:
         """Numbers of the bodies that can meet: the one on the later link, then the other. Shape (p, 2)."""
         ignored = {frozenset(pair) for pair in self.ignored}
         found = [
@@ -141,14 +156,16 @@ class Bodies(Frozen):
             if self.links[first] - self.links[second] > 1
             and frozenset((self.names[first], self.names[second])) not in ignored
         ]
-        return np.array(found, dtype=np.int64).reshape(-1, 2)
+        pairs = np.array(found, dtype=np.int64).reshape(-1, 2)
+        pairs.flags.writeable = False
+        return pairs
 
     @property
     def shapes(self) -> Shapes:
         """The bodies as kernels see them."""
         sizes = 0.5 * np.linalg.norm(self.ends - self.starts, axis=1) + self.radii
         links = np.array(self.links, dtype=np.int64)
-        return Shapes(links, self.starts.copy(), self.ends.copy(), self.radii.copy(), sizes, self.pairs)
+        return Shapes(links, self.starts.copy(), self.ends.copy(), self.radii.copy(), sizes, self.pairs.copy())
 
     def surroundings(self, obstacles: Sequence[Neighbour]) -> Surroundings:
         """Obstacles as kernels see them, those that move at their own place.
@@ -159,12 +176,13 @@ class Bodies(Frozen):
         Raises:
             UnknownNameError: An obstacle ignores a body that there is not.
         """
-        boxes = np.array([one.numbers() for one in obstacles]).reshape(-1, OBSTACLE)
-        checked = np.empty((len(obstacles), len(self)), dtype=np.bool_)
-        for row, one in zip(checked, obstacles, strict=True):
+        rows = [np.reshape(one.numbers(), (-1, OBSTACLE)) for one in obstacles]
+        boxes, checked = np.concatenate([np.empty((0, OBSTACLE)), *rows]), []
+        for one in obstacles:
             known_names("body", one.ignored, self.names)
-            row[:] = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
-        return Surroundings(boxes, checked)
+            meets = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
+            checked += [meets] * one.count
+        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(-1, len(self)))
 
 
 def _names(given: Any) -> tuple[str, ...]:

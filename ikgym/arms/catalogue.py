@@ -16,7 +16,7 @@ from ikgym.arms.bodies import Bodies
 from ikgym.validation import FloatArray
 
 FILE = pathlib.Path(__file__).with_name("arms.toml")
-#: Keys of a table that are no fields of an arm.
+#: Keys of a table that are no fields of an arm, nor of its bodies.
 ABOUT = ("source", "licence", "like")
 
 
@@ -25,7 +25,8 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
 
     Args:
         file: A TOML file with one table an arm, whose keys are the fields of :class:`ikgym.Arm`. Axes may be words such
-            as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields.
+            as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields; the arm has
+            that one's bodies and its own.
 
     Raises:
         OSError: The file cannot be read.
@@ -37,14 +38,21 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
 
 def _arm(name: str, tables: dict[str, Any]) -> Arm:
     table = tables[name]
-    if "like" in table:
-        table = tables[table["like"]] | table
-    fields = {key: value for key, value in table.items() if key not in ABOUT}
+    like = tables[table["like"]] if "like" in table else {}
+    fields = _fields(like | table)
     if isinstance(fields["axes"], str):
         fields["axes"] = directions(fields["axes"])
     if "bodies" in fields:
-        fields["bodies"] = Bodies(**fields["bodies"])
+        fields["bodies"] = _bodies(like.get("bodies", {}), table.get("bodies", {}))
     return Arm(name, **fields)
+
+
+def _bodies(like: dict[str, Any], own: dict[str, Any]) -> Bodies:
+    return Bodies(**{key: [*like.get(key, ()), *own.get(key, ())] for key in _fields(like | own)})
+
+
+def _fields(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key not in ABOUT}
 
 
 def directions(words: str) -> FloatArray:

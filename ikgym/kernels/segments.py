@@ -21,7 +21,11 @@ def _clamped(value):
 
 @inlined
 def between_segments(ax, ay, az, ux, uy, uz, bx, by, bz, vx, vy, vz):
-    """The parameters in [0, 1] of the nearest points of the segments a + s u and b + t v (Ericson 2005, 5.1.9)."""
+    """The parameters in [0, 1] of the nearest points of the segments a + s u and b + t v (Ericson 2005, 5.1.9).
+
+    His determinant a c - b² and its numerator are products of u × v here: the differences lose half of the digits
+    where the segments are nearly parallel.
+    """
     wx, wy, wz = ax - bx, ay - by, az - bz
     a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
     d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
@@ -29,8 +33,10 @@ def between_segments(ax, ay, az, ux, uy, uz, bx, by, bz, vx, vy, vz):
         return 0.0, _clamped(e / c) if c > 0.0 else 0.0
     if c == 0.0:
         return _clamped(-d / a), 0.0
-    determinant = a * c - b * b
-    s = _clamped((b * e - c * d) / determinant) if determinant > 0.0 else 0.0
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    mx, my, mz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
+    determinant = nx * nx + ny * ny + nz * nz
+    s = _clamped((nx * mx + ny * my + nz * mz) / determinant) if determinant > 0.0 else 0.0
     t = (b * s + e) / c
     if t < 0.0:
         return _clamped(-d / a), 0.0

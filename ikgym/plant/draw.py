@@ -10,10 +10,9 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
-from ikgym.kernels.bodies import Shapes
 from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
 from ikgym.plant.checks import PerJoint
-from ikgym.plant.contact import Contacts, turn_bodies
+from ikgym.plant.contact import turn_bodies
 from ikgym.plant.plant import WHOLE, Plant
 from ikgym.plant.severity import scaled
 from ikgym.validation import FloatArray, whole_number
@@ -54,7 +53,7 @@ class Draws:
     """
 
     def __init__(self, plant: Plant, arm: Arm) -> None:
-        self._plant, self._arm = plant, arm
+        self._plant, self._arm, self._shapes = plant, arm, arm.bodies.shapes
         chains = [one.chain for one in plant.arms or (arm,)]
         n = arm.joints
         self._spread = Spread(
@@ -92,13 +91,7 @@ class Draws:
         draw_arms(self._spread, keys, rows, numbers.calibration, numbers.load, out)
 
     def bodies(
-        self,
-        keys: Keys,
-        rows: npt.NDArray[np.int64],
-        numbers: Numbers,
-        axes: FloatArray,
-        shapes: Shapes,
-        contacts: Contacts,
+        self, keys: Keys, rows: npt.NDArray[np.int64], numbers: Numbers, axes: FloatArray, out: tuple[FloatArray, ...]
     ) -> None:
         """Turns the bodies of some rows by the zeros of their joints.
 
@@ -107,11 +100,10 @@ class Draws:
             rows: The numbers of the rows. Shape (k,).
             numbers: What the keys draw from ranges.
             axes: Axes of the arms that were drawn. Shape (N, 2, n, 3).
-            shapes: The bodies of the arm of the data sheet.
-            contacts: Receives the bodies.
+            out: Receives both ends of the bodies in [m]. Shapes (N, 2, b, 3).
         """
-        factors, ends = (numbers.calibration, numbers.load), (contacts.starts, contacts.ends)
-        turn_bodies(self._spread, keys, rows, *factors, axes, shapes.links, (shapes.starts, shapes.ends), ends)
+        shapes, factors = self._shapes, (numbers.calibration, numbers.load)
+        turn_bodies(self._spread, keys, rows, *factors, axes, shapes.links, (shapes.starts, shapes.ends), out)
 
     def numbers(self, keys: Keys) -> tuple[Numbers, FloatArray]:
         """What is drawn from ranges, and the contexts. Shapes (k,), (k, c)."""
@@ -124,14 +116,17 @@ class Draws:
         keys, out = np.array([key], dtype=np.uint64), self.blank(1)
         numbers, context = self.numbers(keys)
         self.arms(keys, np.zeros(1, dtype=np.int64), numbers, out)
-        before, after = (self._made(*(part[0, loaded] for part in out)) for loaded in range(2))
+        ends = np.empty((2, 1, 2, len(self._arm.bodies), 3))
+        self.bodies(keys, np.zeros(1, dtype=np.int64), numbers, out.axes, (ends[0], ends[1]))
+        before, after = (self._made(ends[:, 0, loaded], *(part[0, loaded] for part in out)) for loaded in range(2))
         loaded = after if np.any(self._plant.payload) else before
         bandwidth, delay, load = float(numbers.bandwidth[0]), int(numbers.command_delay[0]), float(numbers.load[0])
         payload = scaled(self._plant.payload, load)
         return DrawnPlant(before, loaded, self._plant.payload_step, bandwidth, delay, payload, context[0])
 
-    def _made(self, offsets: FloatArray, axes: FloatArray, tool: FloatArray, tool_rotation: FloatArray) -> Arm:
-        return self._arm.replace(offsets=offsets, axes=axes, tool=tool, tool_rotation=tool_rotation)
+    def _made(self, ends: FloatArray, *chain: FloatArray) -> Arm:
+        bodies = self._arm.bodies.replace(starts=ends[0], ends=ends[1])
+        return self._arm.replace(**dict(zip(Arms._fields, chain, strict=True)), bodies=bodies)
 
 
 def episode_key(plant: Plant, generator: np.random.Generator) -> int:

@@ -73,7 +73,7 @@ class PlantRows:
         contacts: Contacts | None = None,
     ) -> None:
         self._plant, self._dt, n = plant, dt, arm.joints
-        self.contacts, self._bodies = contacts, arm.bodies.shapes
+        self.contacts = contacts
         self._draws = Draws(plant, arm)
 
         def every_joint(value: PerJoint) -> FloatArray:
@@ -141,7 +141,7 @@ class PlantRows:
         self._draws.arms(of_arms, rows, numbers, self.arms)
         if self.contacts is not None:
             self.contacts.stopped[rows] = False
-            self._draws.bodies(of_arms, rows, numbers, self.arms.axes, self._bodies, self.contacts)
+            self._draws.bodies(of_arms, rows, numbers, self.arms.axes, (self.contacts.starts, self.contacts.ends))
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
         self.state.delay[rows] = numbers.command_delay
         for name in ("pose_noise", "pose_rotation_noise", "pose_every"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -135,6 +136,8 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown,
         if contacts is not None:
             _meet(contacts, chain, row, loaded, k, moving, k == drives.payload_step, q, qdot, plant.drive)
             _show_contacts(contacts, row, k, more)
+        else:
+            more[5][row], more[6][row], more[7][row, 0], more[7][row, 1] = math.inf, 0.0, -1.0, -1.0
         forward(chain, q[row], rotation, position)
         show_row(constants, cost, state, row, more[4][row], (rotation, position, nominal, error), shown)
         for j in range(n):

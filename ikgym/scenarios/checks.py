@@ -49,27 +49,25 @@ def check_parts(fields: Mapping[str, Any]) -> None:
         raise InvalidInputError(f"Scenario {name!r}: task {task.name!r} needs orientations, the trajectory has none.")
 
 
-def obstacles(name: str, arm: Arm, given: Any, collisions: Any) -> tuple[Obstacle, ...]:
+def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
     """The obstacles of a scenario.
 
     Args:
-        name: The scenario's.
-        arm: Its arm.
-        given: The obstacles.
-        collisions: Whether touching matters; None for where there are obstacles.
+        fields: The fields of the scenario; its other parts are checked already.
 
     Raises:
-        InvalidInputError: They are no sequence of obstacles with different names, there are too many, or the arm has no
-            bodies where touching matters.
+        InvalidInputError: They are no sequence of obstacles with different names, there are too many, the arm has no
+            bodies where touching matters, or one is drawn beside a path that is no random joint motion.
         UnknownNameError: One ignores a body that there is not.
     """
+    name, arm, given, collisions = (fields[key] for key in ("name", "arm", "obstacles", "collisions"))
     if not isinstance(given, (tuple, list)) or not all(isinstance(one, Obstacle) for one in given):
         raise InvalidInputError(
             f"obstacles of scenario {name!r}: expected a list of obstacles, got {shortened(given)}."
         )
-    if len(given) > MOST_OBSTACLES:
-        raise InvalidInputError(f"obstacles of scenario {name!r}: expected at most {MOST_OBSTACLES}, got {len(given)}.")
-    names = (*arm.bodies.names, *(one.name for one in given))
+    if (count := sum(one.count for one in given)) > MOST_OBSTACLES:
+        raise InvalidInputError(f"obstacles of scenario {name!r}: expected at most {MOST_OBSTACLES}, got {count}.")
+    names = (*arm.bodies.names, *(one for obstacle in given for one in obstacle.names))
     if twice := {one for one in names if names.count(one) > 1}:
         raise InvalidInputError(
             f"obstacles of scenario {name!r}: expected names that differ from each other and from those of bodies, got "
@@ -77,6 +75,12 @@ def obstacles(name: str, arm: Arm, given: Any, collisions: Any) -> tuple[Obstacl
         )
     for one in given:
         known_names("body", one.ignored, arm.bodies.names)
+    path = fields["trajectory"]
+    if any(one.random for one in given) and not (path.random and path.joint_bound() is not None):
+        raise InvalidInputError(
+            f"obstacles of scenario {name!r}: expected the trajectory of a random joint motion, which what is drawn "
+            f"keeps clear, got a {type(path).__name__}."
+        )
     matters = bool(given) if collisions is None else flag("collisions", collisions)
     if matters and not len(arm.bodies):
         raise InvalidInputError(f"collisions of scenario {name!r}: expected an arm with bodies, {arm.name!r} has none.")

@@ -5,25 +5,65 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import Outcome
 from ikgym.plant.contact import Contacts
 from ikgym.plant.contact_rows import contact_rows
+from ikgym.plant.rows import PlantRows
 from ikgym.scenarios.scenario import Scenario
+from ikgym.trajectories import Trajectory
 from ikgym.validation import BoolArray, FloatArray
+
+
+def plant_rows(scenario: Scenario, rows: int, commands: int) -> PlantRows:
+    """The plants of N arms, with bodies and obstacles where they can touch.
+
+    Args:
+        scenario: The scenario.
+        rows: N.
+        commands: h, the number of past commands shown.
+    """
+    contacts = contacts_of(scenario, rows) if scenario.collides else None
+    return PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, scenario.task.size, commands, contacts)
 
 
 def contacts_of(scenario: Scenario, rows: int) -> Contacts:
     """Bodies and obstacles of N arms in a scenario with collisions."""
-    boxes = scenario.obstacle_rows(scenario.steps + 2)[None]
+    boxes = np.tile(scenario.obstacle_rows(scenario.steps + 2), (rows if scenario.draws_obstacles else 1, 1, 1, 1))
     around, travel = scenario.surroundings, scenario.joint_bound()
     return contact_rows(scenario.arm, scenario.plant, around, boxes, travel, rows, scenario.obstacles_shown)
 
 
+def draw_obstacles(
+    scenario: Scenario,
+    contacts: Contacts,
+    rows: npt.NDArray[np.int64],
+    episodes: Sequence[Trajectory],
+    generators: Sequence[np.random.Generator],
+) -> None:
+    """Draws the obstacles of some rows' episodes.
+
+    Args:
+        scenario: The scenario.
+        contacts: Receives the obstacles.
+        rows: The numbers of the rows. Shape (k,).
+        episodes: Their trajectories.
+        generators: One an episode, see :meth:`ikgym.Scenario.drawn_obstacles`.
+
+    Raises:
+        InvalidInputError: There is no room for an obstacle in an episode.
+    """
+    drawn = np.repeat([one.random for one in scenario.obstacles], [one.count for one in scenario.obstacles])
+    numbers = scenario.drawn_obstacles(episodes, generators)
+    for row, own in zip(rows.tolist(), numbers, strict=True):
+        contacts.boxes[row][:, drawn] = own[drawn]
+
+
 def pair_names(scenario: Scenario, pair: Sequence[int]) -> tuple[str, str]:
     """The names of a pair that :meth:`ikgym.Arm.clearance` or an outcome has."""
-    names = (*scenario.arm.bodies.names, *(one.name for one in scenario.obstacles))
+    names = (*scenario.arm.bodies.names, *(one for obstacle in scenario.obstacles for one in obstacle.names))
     return names[pair[0]], names[pair[1]]
 
 

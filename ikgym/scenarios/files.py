@@ -22,6 +22,7 @@ from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import Obstacle
 from ikgym.plant import Plant
+from ikgym.random_boxes import RandomBoxes
 from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
 from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
@@ -38,7 +39,7 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
     Path: PATHS,
     TimeLaw: TIME_LAWS,
     Orientation: ORIENTATIONS,
-    Obstacle: OBSTACLES,
+    Obstacle: {**OBSTACLES, "random_boxes": RandomBoxes},
 }
 PARTS = (Arm, Bodies, Task, TrackingCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.

@@ -54,7 +54,7 @@ def test_joints_are_called_what_the_file_calls_them(entry):
 
 def test_every_maker_is_in_the_table():
     papers = {"varga7", "varga7_literal", "faitli3", "khan8", "khan8_approximate", "zhang3", "puma560"}
-    with_limits = {name for name in arms.names() if arms.get(name).limited} - papers - {"panda-velocity"}
+    with_limits = {name for name in arms.names() if arms.get(name).limited} - papers - {"panda-velocity", "panda-hand"}
     assert with_limits == {entry.split("@")[0] for entry in MAKERS} | {"fetch_arm"}
 
 
@@ -115,3 +115,13 @@ def test_the_ball_is_where_those_who_calibrated_it_say(name):
     arm, golden = arms.get(name), BALLS[name]
     tool = arm.replace(tool=arm.tool + arm.tool_rotation @ golden["ball"])
     np.testing.assert_allclose(tool.forward(golden["q"])[1], golden["published"], atol=5e-9)
+
+
+def test_the_hand_is_turned_back_by_45_degrees_and_its_tool_point_is_between_the_fingers():
+    flange, hand = arms.get("panda"), arms.get("panda-hand")
+    rotation, position = flange.forward(flange.home)
+    turned, point = hand.forward(hand.home)
+    np.testing.assert_allclose(point, position + 0.1034 * rotation[:, 2], atol=1e-12)
+    np.testing.assert_allclose(turned[:, 2], rotation[:, 2], atol=1e-12)
+    np.testing.assert_allclose(turned[:, 0], (rotation[:, 0] - rotation[:, 1]) / np.sqrt(2.0), atol=1e-12)
+    assert hand.bodies.names == (*flange.bodies.names, "hand", "fingers")

@@ -8,7 +8,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.policy import Problem
-from benchmarks import environments, horizon_solvers, horizons, loop, measuring, policies, poses, resets
+from benchmarks import bodies, environments, horizon_solvers, horizons, loop, measuring, policies, poses, resets
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 
 
@@ -63,6 +63,17 @@ def test_both_kinematics_are_of_the_same_arm():
     np.testing.assert_allclose(data.oMf[frame].translation, arm.forward(q)[1], atol=1e-12)
     for call, _ in poses.kinematics().values():
         call()
+
+
+def test_coal_measures_the_same_bodies():
+    arm, obstacles = bodies.panda(), bodies.ten_boxes()
+    q = bodies.postures(arm, 20)
+    measure, found = bodies.with_coal(arm, obstacles)
+    for row, distance in zip(q, arm.clearance(q, obstacles)[0], strict=True):
+        measure(row)
+        assert min(one.min_distance for one in found.distanceResults) == pytest.approx(distance, abs=1e-9)
+    (table,) = bodies.tables(measuring.QUICK)
+    assert len(table.rows) == 4
 
 
 def test_libraries_are_timed_beside_their_policies():

@@ -1,0 +1,130 @@
+"""Distances between the bodies of a Panda with a hand, and from ten boxes, beside coal: how long they take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import coal
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+import ikgym
+from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.poses import pinocchio_model
+from benchmarks.table import Table
+from ikgym.arms import Arm
+from ikgym.arms.bodies import Bodies
+from ikgym.kernels.bodies import clearance_rows, near_rows
+from ikgym.obstacles import Box, Capsule
+from ikgym.validation import FloatArray
+
+#: Postures of a batch.
+LOOP = 1000
+#: Pairs that are nearer are asked for, in [m], and at most so many.
+NEAR, MOST = 0.1, 16
+
+
+#: Capsules of a Panda: link, start and end in the frame of the link, and radius, all in [m].
+CAPSULES = {
+    "base": (0, (-0.12, 0, 0.06), (0, 0, 0.06), 0.08),
+    "shoulder": (1, (0, 0, -0.2), (0, 0, 0), 0.06),
+    "upper": (2, (0, -0.06, 0), (0, 0.06, 0), 0.06),
+    "upper_top": (3, (0, 0, -0.13), (0, 0, -0.06), 0.06),
+    "elbow": (4, (-0.02, -0.05, 0), (-0.02, 0.05, 0), 0.06),
+    "fore": (5, (0, 0, -0.32), (0, 0, -0.22), 0.06),
+    "fore_thin": (5, (0, 0.06, -0.2), (0, 0.08, -0.06), 0.03),
+    "wrist": (6, (0, -0.05, 0), (0, 0.02, 0), 0.05),
+    "flange": (6, (0.07, 0, 0.01), (0.09, 0, -0.03), 0.05),
+    "neck": (7, (0, 0, -0.04), (0, 0, -0.08), 0.04),
+    "hand": (7, (0.07, 0.07, -0.13), (-0.07, -0.07, -0.13), 0.04),
+    "fingers": (7, (0.03, 0.03, -0.2), (-0.03, -0.03, -0.2), 0.02),
+}
+
+
+def panda() -> Arm:
+    """A Panda in 12 capsules, three of them its hand and fingers."""
+    bodies = Bodies()
+    for name, (link, start, end, radius) in CAPSULES.items():
+        bodies = bodies.added(name, link, start, end, radius=radius)
+    return ikgym.arms.get("panda").replace(bodies=bodies)
+
+
+def ten_boxes() -> list[Box]:
+    """Boxes of 5 to 30 cm around the arm, as drawn."""
+    rng = np.random.default_rng(0)
+    out = []
+    for i in range(10):
+        angle, far = rng.uniform(0, 2 * np.pi), rng.uniform(0.5, 0.9)
+        position = np.array([far * np.cos(angle), far * np.sin(angle), rng.uniform(0.0, 0.9)])
+        out.append(Box(f"box{i}", position, rng.uniform(0.05, 0.3, 3), Rotation.random(rng=rng).as_matrix()))
+    return out
+
+
+def postures(arm: Arm, count: int) -> FloatArray:
+    """Drawn evenly between the limits. Shape (count, n)."""
+    return np.random.default_rng(0).uniform(arm.lower, arm.upper, (count, arm.joints))
+
+
+def kernels(arm: Arm, obstacles: Sequence[Box]) -> dict[str, tuple[Callable[[], object], int]]:
+    """Calls by name, with the number of postures of each."""
+    q, shapes, around = postures(arm, LOOP), arm.bodies.shapes, arm.bodies.surroundings(obstacles)
+    distances, pairs = np.empty(LOOP), np.empty((LOOP, 2), dtype=np.int64)
+    counts, near = np.empty(LOOP, dtype=np.int64), np.empty((LOOP, MOST))
+    near_pairs, gradients = np.empty((LOOP, MOST, 2), dtype=np.int64), np.empty((LOOP, MOST, arm.joints))
+    near_to = (NEAR, counts, near, near_pairs, gradients)
+    return {
+        "ikgym, the smallest": (lambda: clearance_rows(arm.chain, shapes, *around, q, distances, pairs), LOOP),
+        f"ikgym, all within {NEAR:g} m, with gradients": (
+            lambda: near_rows(arm.chain, shapes, *around, q, *near_to),
+            LOOP,
+        ),
+        "ikgym Arm.clearance, one call": (lambda: arm.clearance(q[0], obstacles), 1),
+    }
+
+
+def with_coal(arm: Arm, obstacles: Sequence[Box]) -> tuple[Callable[[FloatArray], object], pin.GeometryData]:
+    """The same pairs for coal: a call that measures all of their distances, and where it leaves them."""
+    model, _ = pinocchio_model(arm)
+    shapes, around, scene = arm.bodies.shapes, arm.bodies.surroundings(obstacles), pin.GeometryModel()
+    for name, link, start, end, radius in zip(arm.bodies.names, *shapes[:4], strict=True):
+        box = Capsule(name, start, end, radius).numbers()
+        scene.addGeometryObject(_geometry(name, int(link), box, coal.Capsule(radius, 2.0 * box[14])))
+    for one, box in zip(obstacles, around.boxes, strict=True):
+        scene.addGeometryObject(_geometry(one.name, 0, box, coal.Box(*one.size)))
+    for first, second in shapes.pairs.tolist():
+        scene.addCollisionPair(pin.CollisionPair(first, second))
+    for obstacle, body in np.argwhere(around.checked).tolist():
+        scene.addCollisionPair(pin.CollisionPair(body, len(arm.bodies) + obstacle))
+    data, found = model.createData(), scene.createData()
+    return (lambda q: pin.computeDistances(model, data, scene, found, q)), found
+
+
+def _geometry(name: str, joint: int, box: FloatArray, shape: coal.CollisionGeometry) -> pin.GeometryObject:
+    return pin.GeometryObject(name, joint, pin.SE3(box[:9].reshape(3, 3), box[9:12]), shape)
+
+
+def tables(effort: Effort = FULL) -> list[Table]:
+    """Distances of the bodies of a Panda with a hand from each other and from ten boxes."""
+    arm, obstacles = panda(), ten_boxes()
+    calls, (measure, _), q = kernels(arm, obstacles), with_coal(arm, obstacles), postures(arm, LOOP)
+
+    def loop() -> None:
+        for row in q:
+            measure(row)
+
+    calls["coal by pin.computeDistances, all distances"] = (loop, LOOP)
+    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
+    per_posture = {name: t / calls[name][1] for name, t in times.items()}
+    fastest = next(iter(per_posture.values()))
+    around = arm.bodies.surroundings(obstacles)
+    return [
+        Table(
+            "Distances of bodies: Panda with hand, ten boxes",
+            f"{len(arm.bodies)} capsules, {len(arm.bodies.pairs)} pairs of them and {around.checked.sum()} with boxes, "
+            f"at {LOOP} random postures, forward kinematics included, one thread, medians. coal measures pair by pair "
+            "in one call a posture, without a broad phase.",
+            ("per posture [µs]", "× the smallest"),
+            {name: (1e6 * t, t / fastest) for name, t in per_posture.items()},
+        )
+    ]

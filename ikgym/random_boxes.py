@@ -1,0 +1,145 @@
+"""Boxes that are drawn when an episode begins, clear of the joint motion behind its path."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import OBSTACLE
+from ikgym.obstacles import Box, Obstacle
+from ikgym.validation import LARGEST, FloatArray, number, whole_number
+
+#: Where boxes are before they are drawn: so far below the base, in [m].
+AWAY = 1e6
+#: Most boxes of one obstacle.
+MOST_BOXES = 1000
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RandomBoxes(Obstacle):
+    """Upright boxes, drawn in each episode of a scenario whose path comes from a random joint motion.
+
+    A box has edges of any length within a range, any angle about the vertical axis, and stands near the motion: it is
+    drawn around a random point of a random body at a random step, and drawn anew until the motion is clear of it by the
+    margin, at each step and between the steps, and comes near to it. So each episode has a clear motion. Boxes may
+    overlap each other. What the arm does to itself is not looked at.
+
+    Args:
+        name: Its name; the boxes are called `name 1`, `name 2`, …
+        lower: Least coordinates of the centres in the base frame, in [m]. Shape (3,).
+        upper: Largest ones, in [m]. Shape (3,).
+        smallest: Least edges in [m], above 0. Shape (3,).
+        largest: Largest ones, in [m]. Shape (3,).
+        count: The number of boxes.
+        margin: The joint motion is nowhere nearer to a box, in [m].
+        within: It comes nearer than that to each box, in [m]. At least the margin.
+        ignored: Names of bodies that may touch them.
+
+    Raises:
+        InvalidInputError: A value is wrong, or a range the wrong way round.
+    """
+
+    name: str
+    lower: FloatArray
+    upper: FloatArray
+    smallest: FloatArray
+    largest: FloatArray
+    count: int = 10
+    margin: float = 0.02
+    within: float = 0.1
+    ignored: Sequence[str] = ()
+
+    random: typing.ClassVar[bool] = True
+    motion: typing.ClassVar[None] = None
+
+    def __post_init__(self) -> None:
+        self._check()
+        for low, high in (("lower", "upper"), ("smallest", "largest")):
+            self._settle(**{low: self._vector(low), high: self._vector(high)})
+            if (getattr(self, low) > getattr(self, high)).any():
+                raise InvalidInputError(
+                    f"{low}, {high} of obstacle {self.name!r}: expected {low} <= {high}, got "
+                    f"{getattr(self, low).tolist()} and {getattr(self, high).tolist()}."
+                )
+        if (self.smallest <= 0.0).any():
+            raise InvalidInputError(
+                f"smallest of obstacle {self.name!r}: expected numbers above 0, got {self.smallest.tolist()}."
+            )
+        self._settle(
+            count=whole_number(f"count of obstacle {self.name!r}", self.count, at_least=1, at_most=MOST_BOXES),
+            margin=self._length("margin"),
+            within=number(f"within of obstacle {self.name!r}", self.within, at_least=self.margin, at_most=LARGEST),
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the boxes."""
+        return tuple(f"{self.name} {i + 1}" for i in range(self.count))
+
+    def numbers(self) -> FloatArray:
+        """Rows of boxes that are not drawn yet, out of the way of everything. Shape (count, 16)."""
+        rows = np.zeros((self.count, OBSTACLE))
+        rows[:, [0, 4, 8]] = 1.0
+        rows[:, 11] = -AWAY
+        return rows
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The smallest and the largest numbers that a box may have. Shapes (16,)."""
+        turned = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        low = np.concatenate([-turned, [1.0], self.lower, 0.5 * self.smallest, [0.0]])
+        return low, np.concatenate([turned, [1.0], self.upper, 0.5 * self.largest, [0.0]])
+
+    def draw(self, arm: Arm, paths: FloatArray, keys: npt.NDArray[np.uint64]) -> FloatArray:
+        """The boxes of several episodes.
+
+        Args:
+            arm: The arm that has to be clear of them.
+            paths: The joint motions, one row a step, in [rad] or [m]. Shape (k, t, n).
+            keys: One an episode: the same key and motion give the same boxes. Shape (k,).
+
+        Returns:
+            Rows of :class:`ikgym.kernels.bodies.Surroundings`. Shape (k, count, 16).
+
+        Raises:
+            InvalidInputError: There is no room for a box in an episode.
+        """
+        from ikgym.kernels.clutter import TRIES, Drawing, draw_boxes  # other scenarios need none of its kernels
+
+        out, found = np.empty((len(paths), self.count, OBSTACLE)), np.empty(len(paths), dtype=np.int64)
+        checked = arm.bodies.surroundings([self]).checked[0]
+        edges = self.smallest.copy(), self.largest.copy()
+        drawing = Drawing(self.lower.copy(), self.upper.copy(), *edges, self.margin, self.within)
+        draw_boxes(arm.chain, arm.bodies.shapes, checked, _bends(arm, paths), drawing, paths, keys, out, found)
+        if found.min(initial=self.count) < self.count:
+            raise InvalidInputError(
+                f"obstacle {self.name!r}: expected room for {self.count} boxes that are {1e3 * self.margin:g} mm away "
+                f"from the joint motion, found a place for {found.min()} of them in {TRIES} draws each; make them "
+                "smaller, their region larger, or draw fewer."
+            )
+        return out
+
+    def boxes(self, rows: FloatArray) -> tuple[Box, ...]:
+        """Drawn boxes as obstacles of their own.
+
+        Args:
+            rows: Result of :meth:`draw` for one episode. Shape (count, 16).
+        """
+        return tuple(
+            Box(name, row[9:12], 2.0 * row[12:15], row[:9].reshape(3, 3), ignored=self.ignored)
+            for name, row in zip(self.names, rows, strict=True)
+        )
+
+
+def _bends(arm: Arm, paths: FloatArray) -> FloatArray:
+    """Bounds of second derivatives: how far from the first joint a point of a body is at most, and 1. Shape (b,)."""
+    prismatic, links = arm.chain.prismatic, np.linalg.norm(arm.offsets, axis=1)
+    links[prismatic] += np.abs(paths[..., prismatic]).max(axis=(0, 1), initial=0.0)
+    ends = np.maximum(np.linalg.norm(arm.bodies.starts, axis=1), np.linalg.norm(arm.bodies.ends, axis=1))
+    far = [links[1:link].sum() + end for link, end in zip(arm.bodies.links, ends, strict=True)]
+    return np.maximum(far, 1.0)

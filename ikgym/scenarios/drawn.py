@@ -1,0 +1,82 @@
+"""Obstacles that are drawn when an episode begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ikgym.arms import Arm
+from ikgym.kernels.random_numbers import stream
+from ikgym.obstacles import Obstacle
+from ikgym.random_boxes import RandomBoxes
+from ikgym.trajectories import Trajectory, joint_paths_of
+from ikgym.validation import FloatArray
+
+
+def rows(
+    arm: Arm,
+    obstacles: Sequence[Obstacle],
+    first: FloatArray,
+    episodes: Sequence[Trajectory],
+    times: FloatArray,
+    generators: Sequence[np.random.Generator],
+) -> FloatArray:
+    """The obstacles at the start of several episodes.
+
+    Args:
+        arm: The arm of the data sheet.
+        obstacles: The obstacles.
+        first: Their rows before any is drawn. Shape (o, 16).
+        episodes: Trajectories of the k episodes.
+        times: Times of the steps in [s]. Shape (t,).
+        generators: One an episode; touched only where an obstacle is drawn.
+
+    Returns:
+        Shape (k, o, 16).
+
+    Raises:
+        InvalidInputError: There is no room for an obstacle in an episode.
+    """
+    out, at = np.tile(first, (len(episodes), 1, 1)), 0
+    if not any(one.random for one in obstacles):
+        return out
+    keys = [int(rng.integers(2**63, dtype=np.uint64)) for rng in generators]
+    paths = joint_paths_of(episodes, np.tile(times, (len(episodes), 1)))
+    for i, one in enumerate(obstacles):
+        if isinstance(one, RandomBoxes):
+            own = np.array([stream(np.uint64(key), np.uint64(i)) for key in keys], dtype=np.uint64)
+            out[:, at : at + one.count] = one.draw(arm, paths, own)
+        at += one.count
+    return out
+
+
+def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
+    """Obstacles of one episode, none of them random.
+
+    Args:
+        obstacles: The obstacles of the scenario.
+        numbers: Their rows in the episode. Shape (o, 16).
+    """
+    out: list[Obstacle] = []
+    at = 0
+    for one in obstacles:
+        out += one.boxes(numbers[at : at + one.count]) if isinstance(one, RandomBoxes) else (one,)
+        at += one.count
+    return tuple(out)
+
+
+def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest and the largest numbers of obstacles in any episode.
+
+    Args:
+        obstacles: The obstacles.
+        low: The smallest numbers of those that are not drawn; others do not matter. Shape (o, 16).
+        high: The largest ones. Shape (o, 16).
+    """
+    low, high, at = low.copy(), high.copy(), 0
+    for one in obstacles:
+        if isinstance(one, RandomBoxes):
+            low[at : at + one.count], high[at : at + one.count] = one.bounds()
+        at += one.count
+    return low, high

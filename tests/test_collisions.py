@@ -1,0 +1,236 @@
+"""Arms that are stopped where bodies touch: simulated in all ways, with coal as the judge."""
+
+import coal
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import ikgym
+from ikgym.arms.bodies import Bodies
+from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from ikgym.plant import Plant
+from ikgym.trajectories import StraightLine
+
+LINKS = Bodies(
+    names=["upper", "lower", "tool"],
+    links=[2, 4, 7],
+    starts=[[0, 0, 0.05], [0, 0, 0.05], [0, 0, -0.05]],
+    ends=[[0, 0, 0.3], [-0.08, 0, 0.38], [0, 0, -0.107]],
+    radii=[0.06, 0.05, 0.04],
+    ignored=[["lower", "upper"]],
+)
+OBSTACLES = [
+    HalfSpace("floor", [0, 0, -0.2], [0.1, 0, 1]),
+    Box("box", [0.75, 0.2, 0.5], [0.2, 0.1, 0.3], rotation=ikgym.arms.get("panda").tool_rotation),
+    Sphere("ball", [0.2, -0.6, 0.5], 0.1),
+    Capsule("post", [-0.5, 0.3, 0.0], [-0.5, 0.3, 1.0], 0.05),
+]
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    base = ikgym.scenarios.get("panda-circle")
+    return base.replace(name="crowd", arm=base.arm.replace(bodies=LINKS), obstacles=OBSTACLES, steps=1000)
+
+
+def line(way, duration):
+    """A motion from the base frame along a straight line."""
+    upright = np.eye(3).ravel()
+    return StraightLine([*upright, 0, 0, 0], [*upright, *way], duration=duration, blend=0.1)
+
+
+def wild(rows, steps, seed=0):
+    """Actions that lead joints somewhere, one arm another way than the next."""
+    rng = np.random.default_rng(seed)
+    drift = rng.uniform(-1, 1, (1, rows, 7))
+    return np.clip(drift + 0.3 * rng.normal(size=(steps, rows, 7)), -1, 1).astype(np.float32)
+
+
+def coal_shape(numbers, radius=0.0):
+    rotation, position, half, own = numbers[:9].reshape(3, 3), numbers[9:12], numbers[12:15], numbers[15]
+    if half[0] < 0.0:
+        return coal.Halfspace(rotation[:, 2], float(rotation[:, 2] @ position)), coal.Transform3s()
+    shape = coal.Box(*(2 * half)) if half[0] > 0.0 else coal.Capsule(own + radius, 2 * half[2])
+    return shape, coal.Transform3s(rotation, position)
+
+
+class Judge:
+    """The smallest distance of an arm's bodies from obstacles and each other by coal, 0 or less where they overlap."""
+
+    def __init__(self, scenario):
+        self.arm, bodies = scenario.arm, scenario.arm.bodies
+        capsules = [Capsule("c", *ends, r) for *ends, r in zip(bodies.starts, bodies.ends, bodies.radii, strict=True)]
+        self.bodies = [coal_shape(one.numbers()) for one in capsules]
+        self.obstacles = [coal_shape(box) for box in scenario.surroundings.boxes]
+        self.pairs = [(a, b) for a, b in bodies.pairs]
+        self.request, self.result = coal.DistanceRequest(), coal.DistanceResult()
+
+    def frames(self, q):
+        """The frames of the links, the base first."""
+        rotation, position, out = np.eye(3), np.zeros(3), [coal.Transform3s()]
+        for offset, axis, angle in zip(self.arm.offsets, self.arm.axes, q, strict=True):
+            position = position + rotation @ offset
+            skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+            rotation = rotation @ (np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew)
+            out.append(coal.Transform3s(rotation, position))
+        return out
+
+    def __call__(self, q):
+        frames = self.frames(q)
+        links = self.arm.bodies.links
+        placed = [(shape, frames[link] * at) for link, (shape, at) in zip(links, self.bodies, strict=True)]
+        pairs = [(placed[a], placed[b]) for a, b in self.pairs]
+        pairs += [(body, other) for body in placed for other in self.obstacles]
+        return min(self.distance(*one, *other) for one, other in pairs)
+
+    def distance(self, *shapes):
+        self.result.clear()
+        return coal.distance(*shapes, self.request, self.result)
+
+
+def test_no_arm_passes_through_a_body(scenario):
+    check_wild(scenario, rows=24, steps=600, sample=40)
+
+
+@pytest.mark.slow
+def test_no_arm_passes_through_a_body_in_many_steps(scenario):
+    check_wild(scenario, rows=1000, steps=1000, sample=1000)
+
+
+def check_wild(scenario, rows, steps, sample):
+    """Random motion: between steps no body is inside another one, and arms that would touch stand still."""
+    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario)
+    seen, _ = envs.reset(seed=5)
+    judge, stopped, lowest, count = Judge(scenario), np.zeros(rows, dtype=bool), np.inf, 0
+    for action in wild(rows, steps):
+        before = seen["q"].copy()
+        seen, _, _, _, info = envs.step(action)
+        assert not (stopped & ~info["collision"]).any()
+        held = seen["q"][info["collision"]]
+        np.testing.assert_array_equal(held, before[info["collision"]])
+        assert not seen["qdot"][info["collision"]].any()
+        stopped = info["collision"]
+        near = np.flatnonzero((info["clearance"] < 0.01) & ~stopped)
+        for row in near[-count % sample :: sample]:
+            for share in np.linspace(0.1, 1.0, 10):
+                lowest = min(lowest, judge(before[row] + share * (seen["q"][row] - before[row])))
+        count += len(near)
+    assert 0.0 < lowest < 0.01
+    assert 0.1 < stopped.mean() < 1.0
+
+
+def test_info_has_the_clearance_of_the_arm(scenario):
+    env = gym.make("RedundantIK-v0", scenario=scenario)
+    env.reset(seed=1)
+    for action in wild(1, 30)[:, 0]:
+        seen, _, terminated, _, info = env.step(action)
+        assert info["clearance"] == scenario.arm.clearance(seen["q"], OBSTACLES)[0]
+        assert not terminated
+
+
+def test_bodies_belong_to_the_arm_that_moves(scenario):
+    plant = Plant(zero=0.02, link=5e-3, axis=0.02, payload=0.02, payload_step=15)
+    drawn = scenario.replace(plant=plant, obstacles=OBSTACLES[1:2])
+    env = gym.make("RedundantIK-v0", scenario=drawn)
+    seen, _ = env.reset(seed=4)
+    moved = drawn.drawn_plant(4)
+    for k, action in enumerate(wild(1, 30)[:, 0], start=1):
+        seen, _, _, _, info = env.step(action)
+        arm = moved.loaded_arm if k >= 15 else moved.arm
+        assert not info["collision"]
+        assert info["clearance"] == pytest.approx(arm.clearance(seen["q"], drawn.obstacles)[0], abs=1e-12)
+        ends, tool = arm.bodies.ends, drawn.arm.tool
+        assert np.linalg.norm(ends[-1]) == pytest.approx(np.linalg.norm(tool), abs=1e-12)
+
+
+def test_an_arm_that_is_stopped_pays_to_the_end(scenario):
+    env = gym.make("RedundantIK-v0", scenario=scenario)
+    env.reset(seed=1)
+    rewards, collided = [], []
+    for _ in range(scenario.steps):
+        _, reward, _, over, info = env.step(np.array([0, 1, 0, 0, 0, 0, 0], dtype=np.float32))
+        rewards.append(reward)
+        collided.append(info["collision"])
+    assert over
+    first = collided.index(True)
+    assert all(collided[first:])
+    assert max(rewards[first:]) < 0.0
+
+
+def test_one_arm_many_in_a_loop_and_many_at_once_agree(scenario):
+    moving = Capsule("person", [0, 0.5, 0], [0, 0.5, 1], 0.1, motion=line([0.4, -0.3, 0], 0.5))
+    plant = Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
+    crowd = scenario.replace(obstacles=[*OBSTACLES, moving], plant=plant)
+    vectors = [
+        gym.make_vec("RedundantIK-v0", num_envs=5, scenario=crowd, vectorization_mode=mode)
+        for mode in ("sync", "vector_entry_point")
+    ]
+    seen = [envs.reset(seed=3)[0] for envs in vectors]
+    for action in wild(5, 200):
+        results = [envs.step(action) for envs in vectors]
+        for key in seen[0]:
+            np.testing.assert_array_equal(results[0][0][key], results[1][0][key])
+        for key in ("clearance", "collision"):
+            np.testing.assert_array_equal(results[0][4][key], results[1][4][key])
+    assert results[0][4]["collision"].any()
+    assert results[0][0]["obstacles"].shape == (5, 5, 16)
+
+
+def test_obstacles_are_shown_as_they_will_be_after_the_step(scenario):
+    way = line([0.4, 0, 0], 0.4)
+    crowd = scenario.replace(obstacles=[Sphere("ball", [-1, 0, 1], 0.1, motion=way)])
+    env = gym.make("RedundantIK-v0", scenario=crowd)
+    seen, _ = env.reset(seed=0)
+    rows = crowd.obstacle_rows(crowd.steps + 2)
+    np.testing.assert_array_equal(seen["obstacles"], rows[1])
+    assert env.observation_space.contains(seen)
+    seen = env.step(np.zeros(7, dtype=np.float32))[0]
+    np.testing.assert_array_equal(seen["obstacles"], rows[2])
+
+
+def test_a_thing_that_moves_into_an_arm_stops_it(scenario):
+    way = line([1.2, 0, 0], 0.4)
+    crowd = scenario.replace(obstacles=[Sphere("ball", [-0.6, 0, 0.6], 0.1, motion=way)])
+    env = gym.make("RedundantIK-v0", scenario=crowd)
+    env.reset(seed=0)
+    infos = [env.step(np.zeros(7, dtype=np.float32))[4] for _ in range(crowd.steps)]
+    assert infos[-1]["collision"]
+    assert not infos[0]["collision"]
+
+
+def test_without_collisions_nothing_is_stopped_and_costs_are_the_same(scenario):
+    free, bare = (
+        scenario.replace(obstacles=(), collisions=False),
+        ikgym.scenarios.get("panda-circle").replace(steps=1000),
+    )
+    far = scenario.replace(obstacles=[Sphere("far", [50, 0, 0], 0.1)])
+    far = far.replace(
+        arm=far.arm.replace(
+            bodies=far.arm.bodies.replace(ignored=[["tool", "upper"], ["tool", "lower"], ["lower", "upper"]])
+        )
+    )
+    rewards = []
+    for one in (free, bare, far):
+        env = gym.make("RedundantIK-v0", scenario=one)
+        env.reset(seed=2)
+        rewards.append([env.step(action)[1] for action in wild(1, 100)[:, 0]])
+    assert rewards[0] == rewards[1] == rewards[2]
+
+
+def test_a_start_that_touches_is_refused_by_name(scenario):
+    blocked = scenario.replace(obstacles=[Box("crate", [0.3, 0, 0.5], [0.6, 0.6, 0.6])])
+    env = gym.make("RedundantIK-v0", scenario=blocked)
+    with pytest.raises(InvalidInputError, match=r"'(upper|lower|tool)' and 'crate' with -.* mm .* `ignored`"):
+        env.reset(seed=0)
+
+
+def test_a_learner_is_ended_by_a_collision(scenario):
+    env = gym.make("RedundantIK-v0", scenario=scenario, lost_distance=5.0)
+    env.reset(seed=1)
+    for _ in range(scenario.steps):
+        _, _, terminated, _, info = env.step(np.array([0, 1, 0, 0, 0, 0, 0], dtype=np.float32))
+        assert terminated == info["collision"]
+        if terminated:
+            break
+    assert terminated
