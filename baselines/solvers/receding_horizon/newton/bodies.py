@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.problem import Problem
 from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE
+from ikgym.arms import Arm
 from ikgym.kernels.bodies import PLACED, Shapes
 from ikgym.kernels.jit import inner
 from ikgym.plant.contact_rows import sweep
+from ikgym.validation import LARGEST
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -97,12 +98,7 @@ def clearance_workspace(clearance, knots, n):
     )
 
 
-def clearance_of(problem: Problem, margin: float) -> Clearance | None:
-    """Bodies and obstacles of a problem, as they are at the start; None where touching does not matter."""
-    around, model = problem.surroundings, problem.model
-    if around is None:
-        return None
-    travel = np.maximum(np.abs(model.lower), np.abs(model.upper))
-    return Clearance(
-        model.bodies.shapes, around.boxes[None], around.checked, sweep(model, travel, 0.0), margin, margin + INFLUENCE
-    )
+def swept(arm: Arm) -> Floats:
+    """How far each joint of an arm moves each body at most within the limits, see :class:`Clearance`. Shape (k, n)."""
+    travel = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
+    return sweep(arm, np.where(arm.prismatic, np.minimum(travel, LARGEST), 0.0), 0.0)

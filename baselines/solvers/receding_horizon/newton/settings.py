@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.newton.bodies import Clearance
 from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import expanded
 
@@ -45,13 +44,31 @@ class PlanNumbers(NamedTuple):
         prismatic: Which joints are prismatic. Shape (n,).
         numbers: See :func:`plain_settings`.
         integers: See :func:`plain_settings`.
-        clearance: Bodies that must not touch; None where they may.
     """
 
     prismatic: npt.NDArray[np.bool_]
     numbers: Floats
     integers: Integers
-    clearance: Clearance | None
+
+
+class PlanNumbersAmong(NamedTuple):
+    """The parameters as the kernel of a step among bodies takes them.
+
+    Attributes:
+        prismatic, numbers, integers: See :class:`PlanNumbers`.
+        clearance: The distance that is kept at the knots, in [m].
+        sweep: See :class:`bodies.Clearance`. Shape (k, n).
+        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
+    """
+
+    prismatic: npt.NDArray[np.bool_]
+    numbers: Floats
+    integers: Integers
+    clearance: float
+    sweep: Floats
+    bodies: Floats
+    boxes: Floats
 
 
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
