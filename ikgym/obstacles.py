@@ -12,7 +12,7 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Trajectory
-from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix
+from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix, shortened
 
 
 class Obstacle(Frozen, abc.ABC):
@@ -34,14 +34,15 @@ class Obstacle(Frozen, abc.ABC):
     def _check(self) -> None:
         """Checks what all obstacles have."""
         if not isinstance(self.name, str) or not self.name:
-            raise InvalidInputError(f"name of an obstacle: expected a text, got {self.name!r}.")
+            raise InvalidInputError(f"name of an obstacle: expected a text, got {shortened(self.name)}.")
         if self.motion is not None and (not isinstance(self.motion, Trajectory) or self.motion.random):
             raise InvalidInputError(
-                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got {self.motion!r}."
+                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got "
+                f"{shortened(self.motion)}."
             )
-        if isinstance(self.ignored, str) or not all(isinstance(one, str) for one in self.ignored):
+        if not isinstance(self.ignored, (tuple, list)) or not all(isinstance(one, str) for one in self.ignored):
             raise InvalidInputError(
-                f"ignored of obstacle {self.name!r}: expected names of bodies, got {self.ignored!r}."
+                f"ignored of obstacle {self.name!r}: expected a list of names of bodies, got {shortened(self.ignored)}."
             )
         self._settle(ignored=tuple(self.ignored))
 

@@ -28,6 +28,7 @@ class UrdfReference(NamedTuple):
         tip: The link at its end, None for the only leaf.
         tool: Tool point in the frame of the tip in [m], None for its origin. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, None for that frame's. Shape (3, 3).
+        meshes: Whether collision meshes were opened.
     """
 
     file: Path
@@ -35,6 +36,7 @@ class UrdfReference(NamedTuple):
     tip: str | None
     tool: FloatArray | None
     tool_rotation: FloatArray | None
+    meshes: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

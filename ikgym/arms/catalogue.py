@@ -25,8 +25,8 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
 
     Args:
         file: A TOML file with one table an arm, whose keys are the fields of :class:`ikgym.Arm`. Axes may be words such
-            as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields; the arm has
-            that one's bodies and its own.
+            as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields; bodies are
+            that one's and its own.
 
     Raises:
         OSError: The file cannot be read.

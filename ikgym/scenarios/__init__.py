@@ -50,11 +50,11 @@ SPLITS = {
     "validation": range(1_000_000, 2_000_000),
     "test": range(2_000_000, 3_000_000),
 }
-#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, problems of others, and
-#: those of the environments for learning.
+#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, arms that can touch things,
+#: problems of others, and those of the environments for learning.
 FILES = {
     family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"), key=lambda file: file.stem)
-    for family in ("papers", "paths", "plants", "published", "learning")
+    for family in ("papers", "paths", "plants", "bodies", "published", "learning")
 }
 
 
@@ -102,8 +102,8 @@ def names(family: str | None = None) -> tuple[str, ...]:
     """The names of all scenarios but those of learning and :func:`problems_from_elsewhere`, which "all" leaves out.
 
     Args:
-        family: Only those of a folder of the catalogue: ``papers``, ``paths``, ``plants``, ``published`` or
-            ``learning``.
+        family: Only those of a folder of the catalogue: ``papers``, ``paths``, ``plants``, ``bodies``,
+            ``published`` or ``learning``.
 
     Raises:
         UnknownNameError: There is no such folder.

@@ -107,7 +107,7 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
         make, given = arms.get, {"name": table["like"]}
         changes = {key: value for key, value in table.items() if key != "like"}
     elif "urdf" in table:
-        make, own = arms.from_urdf, ("name", "base", "tip", "tool", "tool_rotation")
+        make, own = arms.from_urdf, ("name", "base", "tip", "tool", "tool_rotation", "meshes")
         with located(where):
             known_names("key", table, dict.fromkeys(("urdf", *own, *inspect.signature(Arm).parameters)))
         given = {"path": table["urdf"], **{key: table[key] for key in own if key in table}}
@@ -253,8 +253,10 @@ def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
     """A reference to the URDF file of an arm; None where there is none, or it has changed since."""
     if arm.urdf is None:
         return None
-    path, base, tip, tool, tool_rotation = arm.urdf
+    path, base, tip, tool, tool_rotation, meshes = arm.urdf
     where: Table = {"base": base, "tip": tip, "tool": tool, "tool_rotation": tool_rotation}
+    if meshes:
+        where["meshes"] = True
     try:
         if not _same(arm, arms.from_urdf(path, name=arm.name, **where)):
             return None

@@ -10,25 +10,24 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_names
 
 
-def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, list[UrdfJoint]]:
-    """The name of the robot and the joints between two of its links.
+def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list[UrdfJoint]]:
+    """The link at the beginning of a chain, and its joints.
 
     The links of the whole file must be a tree. Numbers are checked between the two links only: no other joint
     has a say in where the tip is.
 
     Args:
-        data: Content of the file.
+        tree: The links of the file.
         base: Link to begin at, the root if it is None.
         tip: Link to end at, the only leaf below the base that moves if it is None.
 
     Returns:
-        The name, and the joints from base to tip.
+        The base, and the joints from there to the tip.
 
     Raises:
-        InvalidInputError: The file is no URDF, or has no chain of readable joints from base to tip.
+        InvalidInputError: There is no chain of readable joints from base to tip.
         UnknownNameError: There is no such link.
     """
-    tree = Tree(data)
     known_names("link", [link for link in (base, tip) if link is not None], tree.links)
     base = tree.root if base is None else base
     tip = only_tip(tree, base) if tip is None else tip
@@ -40,7 +39,7 @@ def read_chain(data: bytes, base: str | None, tip: str | None) -> tuple[str, lis
     joints = list(map(read_joint, path))
     if not any(joint.kind in MOVING for joint in joints):
         raise InvalidInputError(f"expected a joint that moves between links {base!r} and {tip!r}, got none.")
-    return tree.name, joints
+    return base, joints
 
 
 def only_tip(tree: Tree, base: str) -> str:

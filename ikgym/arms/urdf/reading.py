@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ikgym.arms.arm import Arm, UrdfReference
 from ikgym.arms.home import from_home
+from ikgym.arms.urdf.bodies import with_bodies
 from ikgym.arms.urdf.chain import read_chain
 from ikgym.arms.urdf.joint import MOVING, UrdfJoint
 from ikgym.arms.urdf.tips import Tip, likely_tips
@@ -41,13 +42,20 @@ def from_urdf(
     name: str | None = None,
     tool: npt.ArrayLike | None = None,
     tool_rotation: npt.ArrayLike | None = None,
+    meshes: bool = False,
 ) -> Arm:
     """An arm from the chain between two links of a URDF file.
 
     Revolute, continuous, prismatic and fixed joints are read, with their names and their limits of position and
     velocity; a continuous joint has none of position. A URDF has no limits of acceleration:
     ``arm.replace(acceleration_limit=…)`` adds them. Joints off the chain, a gripper's for example, have no coordinate
-    in the arm. Meshes are never opened.
+    in the arm.
+
+    Collision geometry of the base and of all links below it becomes :attr:`Arm.bodies`, called after the links; what is
+    off the chain is fixed at the zero position of its joints. Spheres and capsules are exact. A cylinder becomes
+    the capsule of its axis and radius, 4/3 π r³ larger; a box up to four capsules along its longest edge, or the sphere
+    around it where that is smaller; a mesh the smallest capsule around its corners that a search finds. The log states
+    the volumes, and the pairs that always touch, which are ignored.
 
     An axis whose length differs from 1 by more than 1e-2 is an error; within that it is taken to be rounded,
     and is scaled to unit length. Files with a DOCTYPE, of more than 16 MiB, or with more than 128 joints
@@ -62,25 +70,29 @@ def from_urdf(
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
             is left out. Shape (3, 3).
+        meshes: Whether collision meshes are opened: STL, OBJ and PLY, by a path from the file or by the name of a
+            package, a folder of that name above the file. Closed ones are no bodies.
 
     Returns:
         The arm. Lengths in [m], angles in [rad], as in the file. Its :attr:`Arm.urdf` names the file.
 
     Raises:
-        InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip; or the tool
-            offset has a wrong shape or is no rotation.
+        InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip; collision
+            geometry has a wrong number, or a mesh cannot be read; or the tool offset has a wrong shape or is no
+            rotation.
         UnknownNameError: There is no link of that name; the message has the nearest one.
-        MissingDependencyError: Pinocchio is not installed.
+        MissingDependencyError: Pinocchio is not installed, or for meshes trimesh or SciPy.
     """
     content = read_user_file(path, MAX_BYTES)
     try:
-        robot, joints = read_chain(content, base, tip)
+        tree = Tree(content)
+        begin, joints = read_chain(tree, base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
         tool = None if tool is None else frozen_array("tool", tool, (3,))
         tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
         home = _with_tool(_home(joints), tool, tool_rotation)
         arm = from_home(
-            robot if name is None else name,
+            tree.name if name is None else name,
             home.axes,
             home.points,
             [joint.kind == "prismatic" for joint in moving],
@@ -91,7 +103,9 @@ def from_urdf(
             velocity_limit=[joint.velocity for joint in moving],
             joint_names=[joint.name for joint in moving],
         )
-        object.__setattr__(arm, "urdf", UrdfReference(Path(path).resolve(), base, tip, tool, tool_rotation))
+        file = Path(path).resolve()
+        arm = with_bodies(arm, tree, begin, file.parent if meshes else None)
+        object.__setattr__(arm, "urdf", UrdfReference(file, base, tip, tool, tool_rotation, meshes))
         return arm
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error

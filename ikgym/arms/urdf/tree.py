@@ -35,7 +35,8 @@ class Tree:
             raise InvalidInputError(f"expected the root element <robot>, got <{robot.tag}>.")
         if any("xacro" in element.tag for element in robot):
             raise InvalidInputError("expected a URDF, got macros of xacro; expand them first: xacro FILE > arm.urdf")
-        self.links = tuple(xml.named(robot, "link"))
+        self._elements = xml.named(robot, "link")
+        self.links = tuple(self._elements)
         self._above: dict[str, tuple[Element, str]] = {}
         self._below: dict[str, list[str]] = {link: [] for link in self.links}
         for joint in xml.named(robot, "joint").values():
@@ -60,14 +61,18 @@ class Tree:
         if len(roots) > 1:
             raise InvalidInputError(f"expected one link without a joint above it, got {xml.listing(roots)}.")
         # Each link has one joint above it, so what the root does not reach goes round in a loop.
-        looping = set(self.links).difference(*map(self._reached, roots))
+        looping = set(self.links).difference(*map(self.below, roots))
         if looping:
             raise InvalidInputError(f"expected a tree of links, got a loop of {xml.listing(sorted(looping))}.")
         return roots[0]
 
     def leaves(self, base: str) -> list[str]:
         """The links below the base that have no other below them."""
-        return [link for link in self._reached(base) if not self._below[link]]
+        return [link for link in self.below(base) if not self._below[link]]
+
+    def collisions(self, link: str) -> list[Element]:
+        """The collision geometry of a link."""
+        return self._elements[link].findall("collision")
 
     def path(self, base: str, tip: str) -> list[Element]:
         """The joints from base to tip.
@@ -91,7 +96,8 @@ class Tree:
             )
         return joints[::-1]
 
-    def _reached(self, base: str) -> list[str]:
+    def below(self, base: str) -> list[str]:
+        """The base and all links below it."""
         reached = [base]
         for link in reached:
             reached.extend(self._below[link])

@@ -1,0 +1,207 @@
+"""Bodies from the collision geometry of URDF files, beside Pinocchio's placements of the same geometry."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+from ikgym.arms import Arm, from_urdf
+from ikgym.arms.urdf import bodies as urdf_bodies
+from ikgym.arms.urdf.covering import Capsule, around, around_box, distances
+from ikgym.exceptions import InvalidInputError
+
+PANDA = Path(__file__).parents[1] / "robots" / "panda_hand.urdf"
+LIMIT = '<limit lower="-1.5" upper="2.5" velocity="3" effort="1"/>'
+
+
+def shape(geometry, xyz="0 0 0", rpy="0 0 0"):
+    return f'<collision><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{geometry}</geometry></collision>'
+
+
+def joint(name, parent, child, kind="revolute", xyz="0 0 0", rpy="0 0 0", axis="0 0 1"):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{LIMIT}</joint>'
+    )
+
+
+def robot(links, joints):
+    inside = "".join(f'<link name="{name}">{shapes}</link>' for name, shapes in links.items())
+    return f'<robot name="r">{inside}{"".join(joints)}</robot>'
+
+
+# Each shape, a fixed link within the chain, and a gripper of which one finger moves.
+LINKS = {
+    "world": "",
+    "base": shape('<box size="0.12 0.1 0.3"/>', "0.1 0 0.2", "0.3 0.2 0.1"),
+    "one": shape('<cylinder radius="0.05" length="0.4"/>', "0 0.1 0.2", "1 0.5 -0.4"),
+    "two": shape('<sphere radius="0.07"/>', "0.02 0.03 0.04") + shape('<sphere radius="0.02"/>', "0.2 0.03 0.04"),
+    "bracket": shape('<cylinder radius="0.03" length="0.2"/>', "0.1 0.1 0", "0 0.7 0"),
+    "tool": shape('<sphere radius="0.01"/>', "0 0 0.1"),
+    "finger": shape('<cylinder radius="0.01" length="0.1"/>', "0.05 0 0"),
+}
+JOINTS = [
+    joint("mount", "world", "base", "fixed", "0.1 0.2 0.3", "0.1 0.2 0.3"),
+    joint("turn", "base", "one", "revolute", "0 0.1 0.4", "0.5 -0.3 0.2", "0 1 0"),
+    joint("slide", "one", "two", "prismatic", "0.3 0 0.1", "-0.2 0.6 0.1", "0.6 0 0.8"),
+    joint("weld", "two", "bracket", "fixed", "0.1 0 0", "0 0 0.9"),
+    joint("roll", "bracket", "tool", "revolute", "0.2 0.1 0", "0.4 0 0.1", "1 0 0"),
+    joint("jaw", "tool", "finger", "prismatic", "0 0.02 0.1", "0 0 0.3", "0 1 0"),
+]
+SMALL = robot(LINKS, JOINTS)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(content):
+        (tmp_path / "arm.urdf").write_text(content)
+        return tmp_path / "arm.urdf"
+
+    return write
+
+
+def placed(arm, q, number, point):
+    """A point of a link, by the kinematics of the joints before it."""
+    if number == 0:
+        return point
+    chain = [each[:number] for each in (arm.offsets, arm.axes, arm.prismatic)]
+    return Arm("part", *chain, tool=point).forward(q[:number])[1]
+
+
+def pinocchio_shapes(xml, base, names, q):
+    """Names of links, and placements and shapes of their collision geometry from the base."""
+    model = pin.buildModelFromXML(xml)
+    geometry = pin.buildGeomFromUrdfString(model, xml, pin.GeometryType.COLLISION)
+    data, geometry_data, whole = model.createData(), geometry.createData(), pin.neutral(model)
+    for name, value in zip(names, q, strict=True):
+        whole[model.joints[model.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(model, data, whole)
+    pin.updateGeometryPlacements(model, data, geometry, geometry_data)
+    start = data.oMf[model.getFrameId(base)]
+    for each, there in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):
+        yield model.frames[each.parentFrame].name, start.actInv(there), each.geometry
+
+
+@pytest.mark.parametrize(("xml", "base", "tip"), [(SMALL, "base", "tool"), (PANDA.read_text(), None, "panda_hand_tcp")])
+def test_bodies_are_where_pinocchio_places_the_geometry(write, xml, base, tip, monkeypatch):
+    monkeypatch.setattr(urdf_bodies, "_outermost", lambda capsules: capsules)  # one body a shape
+    arm = from_urdf(write(xml), base=base, tip=tip)
+    bodies, generator = arm.bodies, np.random.default_rng(1)
+    for q in generator.uniform(arm.lower, arm.upper, (5, arm.joints)):
+        seen = list(pinocchio_shapes(xml, base or "panda_link0", arm.joint_names, q))
+        assert len(seen) == len(bodies)
+        for i, (name, number) in enumerate(zip(bodies.names, bodies.links, strict=True)):
+            same = [entry for entry in seen if entry[0] == name.split("[")[0]]
+            _, there, solid = same[int(name.split("[")[1][:-1]) - 1 if "[" in name else 0]
+            ends = [placed(arm, q, number, point) for point in (bodies.starts[i], bodies.ends[i])]
+            np.testing.assert_allclose(np.mean(ends, axis=0), there.translation, atol=1e-9)
+            length = {"Cylinder": "halfLength", "Box": "halfSide"}.get(type(solid).__name__)
+            if length is not None:
+                axis = 2.0 * np.max(getattr(solid, length)) * there.rotation[:, 2]
+                np.testing.assert_allclose(ends[1] - ends[0], axis, atol=1e-9)
+            if length != "halfSide":
+                assert bodies.radii[i] == solid.radius
+
+
+def test_links_are_those_of_the_chain_before_them(write):
+    bodies = from_urdf(write(SMALL), base="base", tip="tool").bodies
+    found = dict(zip(bodies.names, bodies.links, strict=True))
+    assert found == {"base": 0, "one": 1, "two[1]": 2, "two[2]": 2, "bracket": 2, "tool": 3, "finger": 3}
+
+
+def test_links_above_the_base_are_left_out(write):
+    assert "base" not in from_urdf(write(SMALL), base="one", tip="tool").bodies.names
+
+
+@pytest.mark.parametrize("size", [(1, 1, 1), (0.3, 0.2, 0.1), (0.1, 0.5, 0.02), (2.0, 0.01, 1.0), (0.1, 0.1, 1.0)])
+def test_capsules_contain_their_box(size):
+    capsules = around_box(size)
+    points = (np.random.default_rng(0).random((2000, 3)) - 0.5) * size
+    corners = 0.5 * np.array(size) * (np.indices((2, 2, 2)).reshape(3, -1).T * 2 - 1)
+    outside = [distances(np.vstack([points, corners]), one.start, one.end) - one.radius for one in capsules]
+    assert np.min(outside, axis=0).max() < 1e-12
+    assert len(capsules) <= 4
+
+
+def test_the_capsule_around_a_mesh_contains_its_corners_and_is_small():
+    generator = np.random.default_rng(3)
+    for _ in range(3):
+        points = generator.normal(size=(400, 3)) * [0.1, 0.05, 0.02]
+        capsule = around(points)
+        assert (distances(points, capsule.start, capsule.end) <= capsule.radius * (1 + 1e-12)).all()
+    mesh = trimesh.creation.capsule(0.4, 0.1)
+    mesh.apply_transform(trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.6, 0.3])))
+    found, exact = around(np.array(mesh.vertices)), Capsule(np.zeros(3), np.array([0, 0, 0.4]), 0.1).volume
+    assert found.volume < 1.02 * exact
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply"])
+@pytest.mark.parametrize("name", ["package://some_robot/meshes/link", "meshes/link"])
+def test_meshes_are_opened_where_they_are_asked_for(tmp_path, kind, name, caplog):
+    folder = tmp_path / "some_robot"
+    (folder / "meshes").mkdir(parents=True)
+    mesh = trimesh.creation.cone(0.1, 0.5)
+    mesh.export(folder / "meshes" / f"link.{kind}")
+    inside = shape(f'<mesh filename="{name}.{kind}" scale="1 2 1"/>', "0.1 0 0", "0 0.5 0")
+    path = folder / "arm.urdf"
+    path.write_text(robot({"a": "", "b": inside}, [joint("j", "a", "b", xyz="0 0 1", rpy="0.3 0 0")]))
+    with caplog.at_level(logging.INFO, "ikgym"):
+        assert len(from_urdf(path).bodies) == 0
+    assert "1 meshes were not opened" in caplog.text
+    arm = from_urdf(path, meshes=True)
+    assert arm.bodies.names == ("b",)
+    pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0, 0), np.zeros(3)) * pin.SE3(
+        pin.rpy.rpyToMatrix(0, 0.5, 0), np.array([0.1, 0, 0])
+    )
+    corners = np.array([pose.act(corner) for corner in np.array(mesh.vertices) * [1, 2, 1]])
+    outside = distances(corners, arm.bodies.starts[0], arm.bodies.ends[0]) - arm.bodies.radii[0]
+    assert outside.max() < 1e-6  # single precision of the files
+    assert outside.max() > -1e-3
+
+
+def test_a_cylinder_between_two_spheres_is_one_capsule(write):
+    ends = [shape('<sphere radius="0.1"/>', f"0 0 {z}") for z in (-0.2, 0.2)]
+    link = shape('<cylinder radius="0.1" length="0.4"/>') + "".join(ends) + ends[0]
+    assert from_urdf(write(robot({"a": "", "b": link}, [joint("j", "a", "b")]))).bodies.names == ("b",)
+
+
+def test_pairs_that_always_touch_are_ignored_and_named(write, caplog):
+    ball = shape('<sphere radius="0.3"/>')
+    links = {"a": ball, "b": "", "c": ball, "d": shape('<sphere radius="0.1"/>', "0.35 0 0")}
+    steps = [joint("j", "a", "b"), joint("k", "b", "c", xyz="0.1 0 0"), joint("l", "c", "d", axis="0 1 0")]
+    with caplog.at_level(logging.INFO, "ikgym"):
+        bodies = from_urdf(write(robot(links, steps))).bodies
+    assert set(map(frozenset, bodies.ignored)) == {frozenset("ac")}  # d meets a in some postures
+    assert "r: ignored, since they always touch: c and a" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [
+        ('<sphere radius="-1"/>', "link 'b': expected radius of <sphere> above 0, got '-1'"),
+        ("<sphere/>", "link 'b': expected <sphere radius=\"…\">, got none"),
+        ('<cylinder radius="1" length="nan"/>', "link 'b': expected length to be a finite number, got 'nan'"),
+        ('<box size="1 2"/>', "link 'b': expected size to be 3 finite numbers"),
+        ("<cone/>", "expected one of 'sphere', 'cylinder', 'capsule', 'box', 'mesh' in <geometry>, got 'cone'"),
+        ("", "in <geometry>, got none"),
+        ('<mesh filename="package://no/such.stl"/>', "expected the mesh 'package://no/such.stl'"),
+        ('<mesh filename="arm.urdf"/>', "expected a mesh of kind .stl, .obj, .ply, got 'arm.urdf'"),
+        ('<mesh filename="broken.stl"/>', "link 'b': expected a mesh"),
+    ],
+)
+def test_bad_geometry_is_refused(write, geometry, message):
+    path = write(robot({"a": "", "b": shape(geometry)}, [joint("j", "a", "b")]))
+    path.with_name("broken.stl").write_bytes(b"no mesh")
+    with pytest.raises(InvalidInputError) as caught:
+        from_urdf(path, meshes=True)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_more_shapes_than_an_arm_may_have_are_refused(write):
+    many = "".join(shape('<sphere radius="0.1"/>', f"{i} 0 0") for i in range(urdf_bodies.MAX_BODIES + 1))
+    with pytest.raises(InvalidInputError, match="expected at most 256 bodies"):
+        from_urdf(write(robot({"a": "", "b": many}, [joint("j", "a", "b")])))
