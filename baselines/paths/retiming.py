@@ -110,11 +110,12 @@ def refusal(found: Survey) -> str:
     time = best.reached * found.duration
     x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
     where = f"from {time:.3g} s on, at ({', '.join(f'{one:.4g}' for one in x)}) m"
-    if (met := best.contact) is not None and met.touched:
-        first, second = met.pair
-        return (
-            f"no start leads along all of it clear. In the farthest {first!r} and {second!r} touch at {met.time:.3g} s."
-        )
+    touching = [one.contact for one in found.branches if one.contact is not None and one.contact.touched]
+    if touching:
+        (first, second), when = touching[0].pair, touching[0].time
+        met = f"From {len(touching)} of {len(found.branches)} bodies touch, as {first!r} and {second!r} at {when:.3g} s."
+        also = "" if best.contact is touching[0] else f" The farthest misses poses {where}."
+        return f"no start leads along all of it and keeps clear. {met}{also}"
     return f"no start reaches all of it. The farthest misses poses {where}, and by up to {far}."
 
 
