@@ -18,6 +18,9 @@ SLOWEST, PRECISION = 5.0, 0.01
 #: Most branches that are tried, and how often a timing is worked out again from the motion in the one before.
 TRIED, AGAIN = 4, 2
 
+#: Bodies that come nearer than this in [m] are said to be in the way.
+NEAR = 0.02
+
 #: Largest errors in [m] and [rad].
 Errors = tuple[float, float]
 
@@ -110,13 +113,14 @@ def refusal(found: Survey) -> str:
     time = best.reached * found.duration
     x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
     where = f"from {time:.3g} s on, at ({', '.join(f'{one:.4g}' for one in x)}) m"
-    touching = [one.contact for one in found.branches if one.contact is not None and one.contact.touched]
-    if touching:
-        (first, second), when = touching[0].pair, touching[0].time
-        met = f"From {len(touching)} of {len(found.branches)} bodies touch, as {first!r} and {second!r} at {when:.3g} s."
-        also = "" if best.contact is touching[0] else f" The farthest misses poses {where}."
-        return f"no start leads along all of it and keeps clear. {met}{also}"
-    return f"no start reaches all of it. The farthest misses poses {where}, and by up to {far}."
+    missed = f"misses poses {where}, and by up to {far}"
+    if (met := best.contact) is None or met.clearance > NEAR:
+        return f"no start reaches all of it. The farthest {missed}."
+    (first, second), apart = met.pair, "touch" if met.touched else f"are {1e3 * met.clearance:.3g} mm apart"
+    return (
+        f"no start reaches all of it and keeps clear. The farthest {missed}; {first!r} and {second!r} {apart} at "
+        f"{met.time:.3g} s."
+    )
 
 
 def _faster(found: Survey, branch: Branch, best: _Candidate | None, errors: Errors, fastest: bool) -> _Candidate | None:

@@ -33,8 +33,8 @@ FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: of these rooms, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
 #: with more than the last share of a velocity limit, where accelerations are not limited.
 SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.3, 0.1
-#: A clearance in [m] below the first of these is too small for a real arm; more than the second is no better.
-CLOSE, CLEAR = 0.005, 0.05
+#: A clearance in [m] below the first of these, less than `qp` keeps, is too small; more than the second is no better.
+CLOSE, CLEAR = 0.003, 0.05
 
 
 class Contact(NamedTuple):

@@ -8,11 +8,9 @@ from baselines.viewer.session import Session
 from ikgym.solids import bounded, closest
 from tests.bodied import blocked, crowd
 
-pytest.importorskip("viser")
 transforms = pytest.importorskip("viser.transforms")
-
-from baselines.viewer import server as servers
-from tests.baselines.viewer.test_arms import place
+servers = pytest.importorskip("baselines.viewer.server")
+place = pytest.importorskip("tests.baselines.viewer.test_arms").place
 
 
 @pytest.fixture
