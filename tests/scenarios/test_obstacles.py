@@ -59,7 +59,7 @@ def test_obstacles_make_collisions_matter():
 def test_replace_checks_a_copy():
     assert [one.name for one in SCENARIO.replace(obstacles=[BALL]).obstacles] == ["ball"]
     with pytest.raises(InvalidInputError, match="an arm with bodies"):
-        SCENARIO.replace(arm=LINE.arm)
+        SCENARIO.replace(arm=ARM.replace(bodies=Bodies()))
     near = BALL.replace(position=ARM.forward(SCENARIO.start_of())[1])
     with pytest.raises(InvalidInputError, match="'hand' and 'ball'"):
         SCENARIO.replace(obstacles=[near])
