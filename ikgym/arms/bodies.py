@@ -185,7 +185,7 @@ class Bodies(Frozen):
             known_names("body", one.ignored, self.names)
             meets = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
             checked += [meets] * one.count
-        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(-1, len(self)))
+        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(len(boxes), len(self)))
 
 
 def _names(given: Any) -> tuple[str, ...]:
