@@ -183,7 +183,7 @@ def dh(**changes):
 
 
 def around(*obstacles, bodies=BODIES, **changes):
-    PANDA_LINE.replace(arm=ARM.replace(bodies=bodies), obstacles=obstacles, **changes)
+    return PANDA_LINE.replace(arm=ARM.replace(bodies=bodies), obstacles=obstacles, **changes)
 
 
 #: What a call refuses, by a word that its message names: values that do not go together, and arguments of methods.
@@ -218,8 +218,8 @@ REFUSED = [
     ("name of an obstacle", lambda: Sphere("", [0, 0, 0], 1.0)),
     ("not random", lambda: Sphere("a", [0, 0, 0], 1.0, SPLINE)),
     ("names of bodies", lambda: Sphere("a", [0, 0, 0], 1.0, ignored="hand")),
-    ("'hand' and 'a'.*mm between them.*`ignored`", lambda: around(Sphere("a", [0.4, 0, 0.5], 0.5, ignored=("upper",)))),
-    ("'hand' and 'upper'.*`ignored`", lambda: around(bodies=BODIES.replace(radii=(0.1, 1.0)), collisions=True)),
+    ("'hand' and 'a'.*mm.*`ignored`", lambda: reset(around(Sphere("a", [0.4, 0, 0.5], 0.5, ignored=("upper",))))),
+    ("'hand' and 'upper'.*`ignored`", lambda: reset(around(bodies=BODIES.replace(radii=(0.1, 1.0)), collisions=True))),
     ("'a' twice", lambda: around(*2 * [Sphere("a", [9, 0, 0], 0.1)])),
     ("'hand' twice", lambda: around(Sphere("hand", [9, 0, 0], 0.1))),
     (f"at most {MOST_OBSTACLES}, got 1000000", lambda: around(*10**6 * [Sphere("a", [9, 0, 0], 0.1)])),

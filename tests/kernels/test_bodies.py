@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from benchmarks.bodies import panda, postures, ten_boxes
+from benchmarks.bodies import postures, ten_boxes
 from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels.bodies import near_rows
@@ -38,7 +38,7 @@ RAIL = ikgym.Arm(
         (0.1, 0.06, 0.05, 0.07),
     ),
 )
-ARMS = {"panda": panda(), "rail": RAIL}
+ARMS = {"panda-hand": ikgym.arms.get("panda-hand"), "rail": RAIL}
 
 every_arm = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
 

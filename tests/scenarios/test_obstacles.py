@@ -59,11 +59,14 @@ def test_obstacles_make_collisions_matter():
 def test_replace_checks_a_copy():
     assert [one.name for one in SCENARIO.replace(obstacles=[BALL]).obstacles] == ["ball"]
     with pytest.raises(InvalidInputError, match="an arm with bodies"):
-        SCENARIO.replace(arm=LINE.arm)
+        SCENARIO.replace(arm=ARM.replace(bodies=Bodies()))
+
+
+def test_what_touches_the_start_is_refused_at_reset():
     near = BALL.replace(position=ARM.forward(SCENARIO.start_of())[1])
     with pytest.raises(InvalidInputError, match="'hand' and 'ball'"):
-        SCENARIO.replace(obstacles=[near])
-    assert SCENARIO.replace(obstacles=[near.replace(ignored=("hand",))]).collides
+        ikgym.RedundantIKEnv(SCENARIO.replace(obstacles=[near])).reset()
+    ikgym.RedundantIKEnv(SCENARIO.replace(obstacles=[near.replace(ignored=("hand",))])).reset()
 
 
 def test_obstacles_at_rest_have_one_row():
