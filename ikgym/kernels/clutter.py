@@ -48,8 +48,8 @@ def draw_boxes(chain, shapes, checked, bends, drawing, paths, keys, out, found):
         chain: The arm, a :class:`ikgym.kernels.kinematics.Chain`.
         shapes: Its bodies, :class:`ikgym.kernels.bodies.Shapes`.
         checked: Whether a body may not touch a box. Shape (b,).
-        bends: Bounds of the second derivatives of points of each body by two joints, in [m] per square of a unit of joint
-            coordinate. Shape (b,).
+        bends: Bounds of the second derivatives of points of each body by two joint coordinates, in [m] per unit of
+            both. Shape (b,).
         drawing: What is drawn.
         paths: Joint coordinates at the steps in [rad] or [m]; straight on in between. Shape (k, t, n).
         keys: Of the random numbers. Shape (k,).
