@@ -152,8 +152,9 @@ def _trajectories() -> dict[tuple[str, str], FloatArray]:
     out = {}
     for names, one in ((stored["names"].tolist(), stored), (more["trajectory_names"].tolist(), more)):
         lengths = [len(_stored()[name].positions) for name in names]
+        keys = zip(names, one["methods"].tolist(), strict=True)
         paths = _restored(one["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
-        out |= {key: read_only(path) for key, path in zip(zip(names, one["methods"].tolist()), paths, strict=True)}
+        out |= {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
     return out
 
 

@@ -4,7 +4,7 @@
     python -m tests.problems.write RL-ITG cppflow
 
 The commits are those in :mod:`ikgym.problems`. Of the twenty paths of each of RL-ITG's random scenes the first one is
-taken, with its first start; of the starts of `s` and `square` the first, too. CppFlow publishes no starts: they are
+taken. Of the published starts the first is taken that is clear by the bodies of our arm, if there is one. CppFlow publishes no starts: they are
 drawn here, the clearest of thirty-two. All boxes are upright.
 """
 
@@ -20,16 +20,20 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.problems import COARSE, FINE, OBSTRUCTED, OBSTRUCTED_FILE, TRAJECTORIES_ORDER, WAYPOINTS_ORDER
+from ikgym.scenarios.obstructed import arm_of, boxes_of
+from ikgym.trajectories.orientations import matrices
 from ikgym.validation import FloatArray
 
 TORSO_LIFT_LINK = np.array([-0.086875, 0.0, 0.37743])
 CONFIG = Path("torm/launch/config")
+#: Clearance of a start, in [m].
+CLEAR = 0.005
 #: Methods, and what their files are called.
 METHODS = {"greedy": "torm_test", "reinforcement": "pirl_rl_test_1"}
 
 
 def rlitg(folder: Path, name: str) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-    """Poses (k, 7), boxes (b, 7), the first start (1, 7) and trajectories (k, 7) of one of RL-ITG's problems."""
+    """Poses (k, 7), boxes (b, 7), a start (1, 7) and trajectories (k, 7) of one of RL-ITG's problems."""
     config, kind = folder / CONFIG, name.removeprefix("rlitg-")
     number = kind.removeprefix("obstacle-")
     path, scene = (kind, kind) if number == kind else (f"random_obs_{int(number)}_0", f"scene_{int(number)}")
@@ -38,10 +42,12 @@ def rlitg(folder: Path, name: str) -> tuple[FloatArray, FloatArray, FloatArray, 
     poses[:, :3] += TORSO_LIFT_LINK
     boxes = np.loadtxt(config / "scene" / f"{scene}.txt", ndmin=2)
     assert not boxes[:, 3:5].any()
-    starts = np.loadtxt(config / "start_conf" / f"{path}_config.csv", delimiter=",", ndmin=2)[:1]
+    starts = np.loadtxt(config / "start_conf" / f"{path}_config.csv", delimiter=",", ndmin=2)
     files = {method: config / "initial_traj" / f"{path}-{text}-0-0.csv" for method, text in METHODS.items()}
     found = {method: np.loadtxt(file, delimiter=",", ndmin=2) for method, file in files.items() if file.exists()}
-    return poses, boxes[:, [0, 1, 2, 6, 7, 8, 5]], starts, found
+    boxes = boxes[:, [0, 1, 2, 6, 7, 8, 5]]
+    clear = arm_of("fetch_arm").clearance(starts, boxes_of(boxes))[0] > CLEAR
+    return poses, boxes, starts[[int(clear.argmax())]], found
 
 
 def cppflow(folder: Path, name: str) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
@@ -66,9 +72,6 @@ def cppflow(folder: Path, name: str) -> tuple[FloatArray, FloatArray, FloatArray
 
 def drawn_start(arm: str, pose: FloatArray, boxes: FloatArray) -> FloatArray:
     """The clearest of some joint coordinates at a pose. Shape (1, n)."""
-    from ikgym.scenarios.obstructed import arm_of, boxes_of
-    from ikgym.trajectories.orientations import matrices
-
     model, rng = arm_of(arm), np.random.default_rng(0)
     low, high = np.maximum(model.lower, -3.0), np.minimum(model.upper, 3.0)
     starts = np.vstack([model.home, rng.uniform(low, high, (31, model.joints))])
