@@ -99,6 +99,11 @@ class Episode:
         iterations: Iterations of the policy. Shape (steps,).
         time_ns: Wall time of the call of `predict`, in [ns]. Shape (steps,), or (0,) where the calls were not timed.
         diagnostics: Diagnostics of the policy by name, see :meth:`SolverPolicy.diagnostics`; each of shape (steps, …).
+        clearance: Smallest signed distance between bodies in [m]; None, like the next two, where the scenario has no
+            collisions. Shape (steps,).
+        pair: The closest pair, and the one that touched where the arm stops, see
+            :func:`ikgym.scenarios.contacts.pair_names`; -1 where nothing can meet. Shape (steps, 2).
+        stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (steps,).
     """
 
     q: FloatArray
@@ -113,6 +118,9 @@ class Episode:
     iterations: npt.NDArray[np.int64]
     time_ns: npt.NDArray[np.int64]
     diagnostics: dict[str, FloatArray]
+    clearance: FloatArray | None = None
+    pair: FloatArray | None = None
+    stopped: FloatArray | None = None
 
 
 def play(
@@ -365,6 +373,8 @@ def _play(
                     "iterations": report.iterations,
                 },
             )
+            if scenario.collides:
+                keep(record, {"clearance": out.clearance, "pair": out.pair, "stopped": out.stopped})
             keep(diagnostics, policy.diagnostics(state))
             step += 1
             if tick is not None and step % TICK == 0:

@@ -15,6 +15,8 @@ from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
+#: Fields of a scenario that change no result: its words, and what matters only where bodies may not touch.
+APART = {"name", "source", "obstacles", "collisions"}
 #: Numbers in arrays, mostly of the order of 1, count up to here.
 DECIMALS = 12
 
@@ -23,11 +25,11 @@ def fingerprint(scenario: Scenario) -> str:
     """Twelve digits that differ where two scenarios would give different results.
 
     Covers all fields of a scenario but its name and its source, and the version of the cost,
-    :data:`ikgym.kernels.cost.COST_VERSION`.
+    :data:`ikgym.kernels.cost.COST_VERSION`. Bodies and obstacles count where touching matters.
     """
-    parts = {
-        f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in {"name", "source"}
-    }
+    parts = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in APART}
+    if scenario.collides:
+        parts["collisions"] = [scenario.arm.bodies, scenario.obstacles]
     parts |= _of_plant(parts.pop("plant"))
     if scenario.start is None and not scenario.starts_nominally:
         parts["start"] = ["near home", scenario.arm.home]
@@ -49,7 +51,8 @@ def _of_plant(plant: Plant) -> dict[str, Any]:
 
 def same(one: object, other: object) -> bool:
     """Whether two frozen objects, such as problems, have the same content, numbers in arrays up to rounding."""
-    return canonical(_canonical(one)) == canonical(_canonical(other))
+    first, second = ([_canonical(part), _canonical(getattr(part, "bodies", None))] for part in (one, other))
+    return canonical(first) == canonical(second)
 
 
 def episode_hash(scenario: Scenario | str, seed: int) -> str:
@@ -75,8 +78,8 @@ def _canonical(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
         if isinstance(value, Arm):
-            # Home posture and names of joints move nothing.
-            del fields["home"], fields["joint_names"]
+            # Home posture and names of joints move nothing, nor do bodies, where touching does not matter.
+            del fields["home"], fields["joint_names"], fields["bodies"]
         if isinstance(value, Arm) and not value.limited:
             # A plant without limits keeps the digest that it had before there were limits.
             del fields["acceleration_limit"]

@@ -14,40 +14,15 @@ from benchmarks.measuring import FULL, Effort, medians
 from benchmarks.poses import pinocchio_model
 from benchmarks.table import Table
 from ikgym.arms import Arm
-from ikgym.arms.bodies import Bodies
 from ikgym.kernels.bodies import clearance_rows, near_rows
 from ikgym.obstacles import Box, Capsule
 from ikgym.validation import FloatArray
 
+ARM = "panda-hand"
 #: Postures of a batch.
 LOOP = 1000
 #: Pairs that are nearer are asked for, in [m], and at most so many.
 NEAR, MOST = 0.1, 16
-
-
-#: Capsules of a Panda: link, start and end in the frame of the link, and radius, all in [m].
-CAPSULES = {
-    "base": (0, (-0.12, 0, 0.06), (0, 0, 0.06), 0.08),
-    "shoulder": (1, (0, 0, -0.2), (0, 0, 0), 0.06),
-    "upper": (2, (0, -0.06, 0), (0, 0.06, 0), 0.06),
-    "upper_top": (3, (0, 0, -0.13), (0, 0, -0.06), 0.06),
-    "elbow": (4, (-0.02, -0.05, 0), (-0.02, 0.05, 0), 0.06),
-    "fore": (5, (0, 0, -0.32), (0, 0, -0.22), 0.06),
-    "fore_thin": (5, (0, 0.06, -0.2), (0, 0.08, -0.06), 0.03),
-    "wrist": (6, (0, -0.05, 0), (0, 0.02, 0), 0.05),
-    "flange": (6, (0.07, 0, 0.01), (0.09, 0, -0.03), 0.05),
-    "neck": (7, (0, 0, -0.04), (0, 0, -0.08), 0.04),
-    "hand": (7, (0.07, 0.07, -0.13), (-0.07, -0.07, -0.13), 0.04),
-    "fingers": (7, (0.03, 0.03, -0.2), (-0.03, -0.03, -0.2), 0.02),
-}
-
-
-def panda() -> Arm:
-    """A Panda in 12 capsules, three of them its hand and fingers."""
-    bodies = Bodies()
-    for name, (link, start, end, radius) in CAPSULES.items():
-        bodies = bodies.added(name, link, start, end, radius=radius)
-    return ikgym.arms.get("panda").replace(bodies=bodies)
 
 
 def ten_boxes() -> list[Box]:
@@ -106,7 +81,7 @@ def _geometry(name: str, joint: int, box: FloatArray, shape: coal.CollisionGeome
 
 def tables(effort: Effort = FULL) -> list[Table]:
     """Distances of the bodies of a Panda with a hand from each other and from ten boxes."""
-    arm, obstacles = panda(), ten_boxes()
+    arm, obstacles = ikgym.arms.get(ARM), ten_boxes()
     calls, (measure, _), q = kernels(arm, obstacles), with_coal(arm, obstacles), postures(arm, LOOP)
 
     def loop() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Trajectory
-from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix
+from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix, shortened
 
 
 class Obstacle(Frozen, abc.ABC):
@@ -34,14 +34,15 @@ class Obstacle(Frozen, abc.ABC):
     def _check(self) -> None:
         """Checks what all obstacles have."""
         if not isinstance(self.name, str) or not self.name:
-            raise InvalidInputError(f"name of an obstacle: expected a text, got {self.name!r}.")
+            raise InvalidInputError(f"name of an obstacle: expected a text, got {shortened(self.name)}.")
         if self.motion is not None and (not isinstance(self.motion, Trajectory) or self.motion.random):
             raise InvalidInputError(
-                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got {self.motion!r}."
+                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got "
+                f"{shortened(self.motion)}."
             )
-        if isinstance(self.ignored, str) or not all(isinstance(one, str) for one in self.ignored):
+        if not isinstance(self.ignored, (tuple, list)) or not all(isinstance(one, str) for one in self.ignored):
             raise InvalidInputError(
-                f"ignored of obstacle {self.name!r}: expected names of bodies, got {self.ignored!r}."
+                f"ignored of obstacle {self.name!r}: expected a list of names of bodies, got {shortened(self.ignored)}."
             )
         self._settle(ignored=tuple(self.ignored))
 
@@ -139,7 +140,7 @@ class Capsule(Obstacle):
         """See :meth:`Obstacle.numbers`."""
         along = self.end - self.start
         length = float(np.linalg.norm(along))
-        rotation = IDENTITY if length == 0.0 else _towards(along / length)
+        rotation = IDENTITY if length == 0.0 else towards(along / length)
         return _row(rotation, 0.5 * (self.start + self.end), np.array([0.0, 0.0, 0.5 * length]), self.radius)
 
 
@@ -210,7 +211,7 @@ class HalfSpace(Obstacle):
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""
         normal = self.normal / np.linalg.norm(self.normal)
-        return _row(_towards(normal), self.position, np.full(3, -1.0), 0.0)
+        return _row(towards(normal), self.position, np.full(3, -1.0), 0.0)
 
 
 #: The kinds of obstacles by their names in scenario files.
@@ -221,10 +222,9 @@ def _row(rotation: FloatArray, position: FloatArray, half: FloatArray, radius: f
     return np.concatenate([np.ravel(rotation), position, half, [radius]])
 
 
-def _towards(direction: FloatArray) -> FloatArray:
-    """A rotation whose third axis is a unit vector."""
-    other = np.zeros(3)
-    other[np.argmin(np.abs(direction))] = 1.0
+def towards(direction: FloatArray) -> FloatArray:
+    """Rotations whose third axes are unit vectors, of shapes (..., 3, 3) and (..., 3)."""
+    other = np.eye(3)[np.argmin(np.abs(direction), axis=-1)]
     first = np.cross(other, direction)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(direction, first), direction])
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(direction, first), direction], axis=-1)

@@ -242,6 +242,14 @@ class Simulator:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
         return self._nominal.positions(row)
 
+    def obstacles(self, row: int) -> FloatArray | None:
+        """The obstacles of a row now; None where touching does not matter. Shape (o, 16)."""
+        if self._plant is None or self._plant.contacts is None:
+            return None
+        boxes, step = self._plant.contacts.boxes, int(self._state.step[row])
+        now: FloatArray = boxes[row % len(boxes), min(step, boxes.shape[1] - 1)]
+        return now
+
     @property
     def true_q(self) -> FloatArray:
         """True joint coordinates, in [rad] or [m]. Shape (N, n)."""

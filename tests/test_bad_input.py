@@ -12,8 +12,12 @@ import pytest
 import ikgym
 import ikgym.rl
 import ikgym.sb3
+from ikgym.arms.bodies import MOST_BODIES, Bodies
 from ikgym.exceptions import IkgymError
+from ikgym.obstacles import KINDS as OBSTACLES
+from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 from ikgym.plant import Plant
+from ikgym.scenarios.checks import MOST_OBSTACLES
 from ikgym.trajectories import (
     KINDS,
     AlongPath,
@@ -46,8 +50,15 @@ ONES = np.ones(7)
 SPLINE = RandomJointSpline(-ONES, ONES, ONES / 3, ONES, 2.0)
 QUATERNIONS = [[1.0, 0, 0, 0], [0.8, 0.6, 0, 0], [0.6, 0.8, 0, 0]]
 LINE = paths.Line([0, 0, 0], [1, 2, 3])
+HELIX = Helix([0, 0, 0], 1, 1, 1)
+BODIES = Bodies(("upper", "hand"), (3, 7), [[0, 0, 0], [0, 0, -0.1]], [[0, 0, 0.1], [0, 0, -0.1]], (0.1, 0.05))
 GOOD = (
     ARM,
+    BODIES,
+    Sphere("sphere", [1, 0, 0], 0.1, HELIX, ("hand",)),
+    Capsule("capsule", [1, 0, 0], [1, 0, 1], 0.1, HELIX, ("hand",)),
+    Box("box", [1, 0, 0], [0.1, 0.2, 0.3], np.eye(3), HELIX, ("hand",)),
+    HalfSpace("floor", [0, 0, 0], [0, 0, 1], HELIX, ("hand",)),
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
     Plant(zero=1e-3, bandwidth=10.0, command_delay=2, arms=(ARM,)),
@@ -85,6 +96,7 @@ ALLOWED = {
     ("Scenario", "model"): ("none",),
     ("Scenario", "steps"): ("none",),
     ("Plant", "bandwidth"): ("inf",),
+    ("Bodies", "ends"): ("none",),
     ("RandomSinusoid", "amplitude"): ("longer",),
     ("JointSpline", "control"): ("longer",),
     ("OrientationThrough", "quaternions"): ("longer",),
@@ -138,8 +150,8 @@ def test_bad_values_of_fields_are_refused_in_one_line(good):
 
 
 def test_every_kind_of_part_is_in_the_table():
-    kinds = {*KINDS.values(), *PATHS.values(), *TIME_LAWS.values(), *ORIENTATIONS.values()}
-    assert kinds == {type(one) for one in GOOD} - {ikgym.Arm, ikgym.Scenario, ikgym.TrackingCost, Plant}
+    kinds = {kind for family in (KINDS, PATHS, TIME_LAWS, ORIENTATIONS, OBSTACLES) for kind in family.values()}
+    assert kinds == {type(one) for one in GOOD} - {ikgym.Arm, Bodies, ikgym.Scenario, ikgym.TrackingCost, Plant}
     assert {JointSpline, ikgym.Scenario} <= {type(one) for one in GOOD}
 
 
@@ -148,7 +160,6 @@ FAST = ikgym.scenarios.get("varga7-fast")
 PLANE = {"a": [1], "d": [0], "alpha": [0]}
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
 STRAIGHT_BACK = [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
-HELIX = ikgym.trajectories.Helix([0, 0, 0], 1, 1, 1)
 VARGA, SKEW = ikgym.arms.get("varga7"), ikgym.tasks.get("skew")
 TWO = ikgym.Arm("two", [[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], (False, True))
 LAW = {"speed": 1.0, "acceleration": 1.0}
@@ -171,6 +182,10 @@ def dh(**changes):
     ikgym.arms.from_dh("one", **PLANE | changes)
 
 
+def around(*obstacles, bodies=BODIES, **changes):
+    return PANDA_LINE.replace(arm=ARM.replace(bodies=bodies), obstacles=obstacles, **changes)
+
+
 #: What a call refuses, by a word that its message names: values that do not go together, and arguments of methods.
 REFUSED = [
     *(("Axis", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
@@ -183,6 +198,37 @@ REFUSED = [
     *(("joint_names", lambda x=x: TWO.replace(joint_names=x)) for x in ("ab", ("a", "a"))),
     ("Did you mean 'tool'", lambda: TWO.replace(tools=1)),
     *(("q: expected", lambda x=x: TWO.forward(x)) for x in (0.0, [1.0], [0, np.nan], ["0", "0"], [1j, 0], None)),
+    ("link of body 'upper'.*from 0, the base, to 2, the last, got 3", lambda: TWO.replace(bodies=BODIES)),
+    ("bodies of arm", lambda: TWO.replace(bodies=())),
+    *((word, lambda field=field, x=x: BODIES.replace(**{field: x})) for word, field, x in (
+        ("radius of body 'hand'.*above 0, got -0.1", "radii", (0.1, -0.1)), ("radii", "radii", (0.1,)),
+        ("radii.*finite", "radii", (0.1, np.nan)), ("starts.*finite", "starts", np.full((2, 3), np.nan)),
+        ("starts.*shape", "starts", np.zeros(6)), ("ends.*shape", "ends", np.zeros((3, 3))), ("links", "links", (1,)),
+        ("links", "links", (1, -1)), ("different texts", "names", ("hand", "hand")), ("names", "names", "ab"),
+        ("names", "names", ("a", "")), ("at most 1000, got 1001", "names", tuple(map(str, range(MOST_BODIES + 1)))),
+        ("two names each", "ignored", ("hand", "upper")), ("two names each", "ignored", (("hand", 1),)),
+        ("Did you mean 'hand'", "ignored", (("hnad", "upper"),)),
+    )),
+    ("different texts", lambda: BODIES.added("hand", 1, [0, 0, 0], radius=0.1)),
+    ("start of body 'new'", lambda: BODIES.added("new", 1, [0, 0], radius=0.1)),
+    ("radius of obstacle 'a'", lambda: Sphere("a", [0, 0, 0], 0.0)),
+    ("size of obstacle 'a'", lambda: Box("a", [0, 0, 0], [1, 0, 1])),
+    ("rotation of obstacle 'a'", lambda: Box("a", [0, 0, 0], [1, 1, 1], np.diag([1, 1, -1]))),
+    ("normal of obstacle 'a'", lambda: HalfSpace("a", [0, 0, 0], [0, 0, 0])),
+    ("name of an obstacle", lambda: Sphere("", [0, 0, 0], 1.0)),
+    ("not random", lambda: Sphere("a", [0, 0, 0], 1.0, SPLINE)),
+    ("names of bodies", lambda: Sphere("a", [0, 0, 0], 1.0, ignored="hand")),
+    ("'hand' and 'a'.*mm.*`ignored`", lambda: reset(around(Sphere("a", [0.4, 0, 0.5], 0.5, ignored=("upper",))))),
+    ("'hand' and 'upper'.*`ignored`", lambda: reset(around(bodies=BODIES.replace(radii=(0.1, 1.0)), collisions=True))),
+    ("'a' twice", lambda: around(*2 * [Sphere("a", [9, 0, 0], 0.1)])),
+    ("'hand' twice", lambda: around(Sphere("hand", [9, 0, 0], 0.1))),
+    (f"at most {MOST_OBSTACLES}, got 1000000", lambda: around(*10**6 * [Sphere("a", [9, 0, 0], 0.1)])),
+    ("list of obstacles", lambda: PANDA_LINE.replace(obstacles=Sphere("a", [9, 0, 0], 0.1))),
+    ("list of obstacles", lambda: around("a")),
+    ("Did you mean 'hand'", lambda: around(Sphere("a", [9, 0, 0], 0.1, ignored=("hnad",)))),
+    ("an arm with bodies, 'panda' has none", lambda: around(Sphere("a", [9, 0, 0], 0.1), bodies=Bodies())),
+    ("an arm with bodies, 'panda' has none", lambda: around(bodies=Bodies(), collisions=True)),
+    *(("collisions", lambda x=x: around(collisions=x)) for x in (1, "yes", np.nan)),
     ("d of arm", lambda: dh(a=[1, 2])),
     ("alpha", lambda: dh(alpha=[np.nan])),
     ("row", lambda: dh(a=[], d=[], alpha=[])),

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from baselines.episodes import Episode, Seeds
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
+from baselines.evaluation.motion.carried import carried
 from baselines.evaluation.motion.played import by_joint
 from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
@@ -94,6 +95,8 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
+        Where the scenario has collisions, ``clearance`` (k,) in [m], and what
+        :func:`baselines.evaluation.motion.carried.carried` gives for the replay.
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
@@ -120,21 +123,29 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     if path is not None:
         log["nominal_q"] = path[after]
     frames = frame_rows(len(kept), FRAMES)
-    return log | {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
+    log |= {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
+    if episode.clearance is None:
+        return log
+    return log | {"clearance": episode.clearance[kept]} | carried(scenario, seeds, log["q"][frames], after[frames])
 
 
 #: The axes of the arrays of a log; those that have names of one letter are of the same length in all arrays.
 AXES: Mapping[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("nominal", "pose"), ("k", "m")),
     **dict.fromkeys(("q", "qdot", "nominal_q", "qddot"), ("k", "n")),
-    **dict.fromkeys(("time", "position_error", "orientation_error"), ("k",)),
+    **dict.fromkeys(("time", "position_error", "orientation_error", "clearance"), ("k",)),
     **dict.fromkeys(("joint_names", "prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
     "frame": ("f",),
     "joint_points": ("f", "n", 2, 3),
     "tool": ("f", 3),
     "tool_rotation": ("f", 3, 3),
+    "solids": ("s", 16),
+    "carriers": ("s",),
+    "carrier_frames": ("f", "c", 12),
+    "closest": ("f", 2, 3),
 }
-OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q")
+CONTACTS = ("clearance", "solids", "carriers", "carrier_frames", "closest")
+OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q", *CONTACTS)
 
 
 def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -144,7 +155,7 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
         ValueError: One is missing, unknown or of another type, or lengths do not fit together.
     """
     known_names("array of a log", log, tuple(AXES))
-    lengths: dict[str | int, int] = {2: 2, 3: 3}
+    lengths: dict[str | int, int] = {length: length for length in (2, 3, 12, 16)}
     for name, axes in AXES.items():
         if name not in log and name in OPTIONAL:
             continue
@@ -154,6 +165,10 @@ def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
             raise ValueError(f"expected {what} of shape {axes} in the array {name}, got shape {shape}")
         if any(lengths.setdefault(axis, length) != length for axis, length in zip(axes, shape, strict=True)):
             raise ValueError(f"the shape {shape} of the array {name} does not fit the others")
+    if (there := [name in log for name in CONTACTS]) != [there[0]] * len(there):
+        raise ValueError(f"expected all or none of the arrays {', '.join(CONTACTS)}")
+    if there[0] and not np.isin(log["carriers"], np.arange(lengths["c"])).all():
+        raise ValueError(f"expected numbers below {lengths['c']} in the array carriers")
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:

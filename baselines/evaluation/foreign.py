@@ -18,6 +18,7 @@ from baselines.status import Status
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
+from ikgym.solids import closest, solids_of
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
 
@@ -171,6 +172,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
             numbers.append(info.get("orientation_error", math.nan))  # absent where the task has none
             # Copies: wrappers may write into the arrays that they receive.
             copies = [seen[key].copy() for key in ("q", "qdot", "pose")]
+            numbers += [info.get("clearance", math.nan), info.get("collision", False)]  # likewise
             self.rows.append((*copies, *map(np.asarray, numbers), info["at_limit"].astype(np.float64)))
         return result
 
@@ -214,7 +216,11 @@ def play_wrapped(
         )
     if tick is not None:
         tick(scenario.steps)
-    q, qdot, pose, tracking, velocity, position, orientation, at_limit = map(np.array, zip(*recorder.rows, strict=True))
+    columns = map(np.array, zip(*recorder.rows, strict=True))
+    q, qdot, pose, tracking, velocity, position, orientation, clearance, stopped, at_limit = columns
+    met = {"clearance": clearance, "stopped": stopped}
+    if scenario.collides:
+        met["pair"] = _pairs(scenario, seeds.seed, q)
     return Episode(
         q,
         qdot,
@@ -228,7 +234,15 @@ def play_wrapped(
         iterations=np.zeros(scenario.steps, dtype=np.int64),
         time_ns=np.array(times if timed else [], dtype=np.int64),
         diagnostics={},
+        **(met if scenario.collides else {}),
     )
+
+
+def _pairs(scenario: Scenario, seed: int, q: FloatArray) -> FloatArray:
+    """The closest pairs after each step, which no info has. Shape (steps, 2)."""
+    boxes = solids_of(scenario.obstacles_of(seed), scenario.times(len(q) + 1)[1:], scenario.model)
+    arm = scenario.drawn_plant(seed).arm
+    return closest(arm, q, boxes, scenario.surroundings.checked).pairs.astype(np.float64)
 
 
 def _shapes(space: gym.Space[Any]) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 import ikgym
 from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
+from baselines.evaluation.motion.contacts import contacts
 from baselines.evaluation.motion.free_timing import first_steps, path_scores
 from baselines.status import Status
 from ikgym.arms import Arm
@@ -68,9 +69,8 @@ class Row:
         followed: Whether the path was followed, see :func:`followed`.
         solver_status: The worst status that the solver reported; unknown for policies that report none. It does not
             say whether the path was followed.
-        time_p50_us: Median wall time of one call of the policy, in [µs], over all but the first, which often does more
-            than the others (and is taken only where there is no other). None, like all times, where the episode was
-            played together with others.
+        time_p50_us: Median wall time of a call of the policy, in [µs], over all but the first, if there is another one.
+            None, like all times, where the episode was played together with others.
         time_p99_us: Its 99th percentile, in [µs].
         deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
         machine: Processor and versions, see :func:`describe`.
@@ -88,6 +88,10 @@ class Row:
         path_position_error: With free timing, the largest distance from the reference at the policy's own progress, in
             [m], to the end of the path; None without.
         path_orientation_error: Likewise, in [rad].
+        clearance_min: Smallest distance between bodies until a stop, in [m]; None, like the rest, without collisions.
+        closest_pair: The names of the two bodies that were closest, or that stopped the arm.
+        closest_step: The step in which they were, from 1.
+        stopped: The step of the stop, from 1; None also if the arm was not stopped.
     """
 
     scenario: str
@@ -130,6 +134,10 @@ class Row:
     path_time: float | None = None
     path_position_error: float | None = None
     path_orientation_error: float | None = None
+    clearance_min: float | None = None
+    closest_pair: list[str] | None = None
+    closest_step: int | None = None
+    stopped: int | None = None
 
     @property
     def lost(self) -> bool:
@@ -144,8 +152,7 @@ class Row:
 
     def to_json(self) -> dict[str, Any]:
         """The row as JSON has it: numbers that are not finite are null."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return {name: _finite_or_none(value) for name, value in values.items()}
+        return {field.name: _finite_or_none(getattr(self, field.name)) for field in dataclasses.fields(self)}
 
     @classmethod
     def nan_restored(cls, values: Any) -> Any:
@@ -250,6 +257,7 @@ def measure(
         path_time=path and path.time,
         path_position_error=path and path.position_error,
         path_orientation_error=path and path.orientation_error,
+        **contacts(scenario, episode),
     )
 
 

@@ -48,19 +48,26 @@ def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str,
             name and the parameters that are not at their defaults.
 
     Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
-    the largest distance from the reference at the policy's own progress, or on the clock of the others.
+    the largest distance from the reference at the policy's own progress, or on the clock of the others. Where a
+    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
 
     Raises:
         InvalidInputError: The training seeds of an agent have played different episodes.
     """
     out: list[dict[str, Any]] = []
     timing = any(row.path_position_error is not None for row in rows)
+    colliding = any(row.clearance_min is not None for row in rows)
     for scenario in dict.fromkeys(row.scenario for row in rows):
         here = [row for row in rows if row.scenario == scenario]
         known = all(row.cost_ratio is not None for row in here)
         lowest = {} if known else _lowest(here)
         labelled = _by_label(here, policies).items()
-        found = [_record(label, some, lowest) | (_along_path(some) if timing else {}) for label, some in labelled]
+        found = [
+            _record(label, some, lowest)
+            | (_along_path(some) if timing else {})
+            | (_contacts(some) if colliding else {})
+            for label, some in labelled
+        ]
         out += sorted(found, key=lambda one: one["cost_ratio"])
     return out
 
@@ -126,6 +133,15 @@ def _record(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> dic
 def _along_path(rows: Sequence[Row]) -> dict[str, float | None]:
     errors = [row.position_error_max if row.path_position_error is None else row.path_position_error for row in rows]
     return {"path_time_s": Summary(rows).path_time, "path_error_mm": 1e3 * max(errors)}
+
+
+def _contacts(rows: Sequence[Row]) -> dict[str, float | None]:
+    together = Summary(rows)
+    stopped, clearance = together.stopped, together.smallest("clearance_min")
+    return {
+        "stopped_percent": None if stopped is None else 100.0 * stopped / len(rows),
+        "clearance_mm": None if clearance is None else 1e3 * clearance,
+    }
 
 
 def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> FloatArray:

@@ -79,6 +79,10 @@ PATH = (
         about="largest distance from the reference at the policy's own progress, with free timing",
     ),
 )
+CONTACTS = (
+    Column("clearance", "[mm]", lambda s: s.smallest("clearance_min"), 1e3, about="smallest distance between bodies"),
+    Column("stopped", "", lambda s: s.stopped, about="episodes in which bodies would have met"),
+)
 LOST = Column("lost", "", lambda s: s.lost, about="episodes in which the arm was lost")
 EPISODES = Column("episodes", "", lambda s: s.episodes, about="number of episodes; more than one of a random scenario")
 FOLLOWED = Column(
@@ -97,6 +101,7 @@ COLUMNS = (
     RATIO,
     *ERRORS,
     *PATH,
+    *CONTACTS,
     *TIMES,
     FOLLOWED,
     STATUS,
@@ -245,6 +250,11 @@ def remarks(rows: Sequence[Row]) -> list[str]:
     )
     small = f"{1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad of error"
     notes.append(f"followed: at most {small} in all steps; solver status: the worst that the solver reported")
+    if any(summary.stopped is not None for summary in summaries):
+        notes.append(
+            "clearance: smallest distance between bodies; stopped: episodes in which they would have met, and the arm "
+            "stood still from then on"
+        )
     if any(summary.episodes > 1 for summary in summaries):
         notes.append(
             "several episodes: costs and cost ratio are geometric means, errors, peaks, p99 and status the worst, p50 "

@@ -154,7 +154,7 @@ class Results:
         write_json(self._file, [row.to_json() for row in self.rows])
 
     def save_csv(self) -> None:
-        """Writes results.csv: the rows as a table, None as an empty cell, and objects as JSON.
+        """Writes results.csv: the rows as a table, None as an empty cell, objects and lists as JSON.
 
         Raises:
             ResultsError: The folder cannot be written.
@@ -164,7 +164,7 @@ class Results:
         table.writerow(COLUMNS)
         for row in self.rows:
             cells = row.to_json().values()
-            table.writerow([canonical(cell) if isinstance(cell, dict) else cell for cell in cells])
+            table.writerow([canonical(cell) if isinstance(cell, (dict, list)) else cell for cell in cells])
         write(self.directory / "results.csv", text.getvalue().encode())
 
     def series_file(self, row: Row) -> pathlib.Path:

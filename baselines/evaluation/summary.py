@@ -6,6 +6,7 @@ import collections
 import dataclasses
 import functools
 import math
+import operator
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Self
@@ -153,6 +154,11 @@ class Summary:
         return sum(row.followed for row in self.rows)
 
     @property
+    def stopped(self) -> int | None:
+        """Number of rows in which the arm was stopped; None without collisions."""
+        return None if self.first.clearance_min is None else sum(row.stopped is not None for row in self.rows)
+
+    @property
     def solver_status(self) -> str:
         """The worst status that the solver reported."""
         return max((row.solver_status for row in self.rows), key=lambda status: Status[status.upper()])
@@ -187,13 +193,16 @@ class Summary:
         """The maximum of a column; None if no episode has a value."""
         return max(self._values(column), default=None)
 
+    def smallest(self, column: str) -> float | None:
+        """The minimum of a column; None if no episode has a value."""
+        return min(self._values(column), default=None)
+
     def total(self, column: str) -> int | None:
         """The sum of a column; None if no episode has a value."""
         return sum(values) if (values := self._values(column)) else None
 
 
-def _total(row: Row) -> float:
-    return row.total_cost
+_total: Callable[[Row], float] = operator.attrgetter("total_cost")
 
 
 def _ratio(row: Row) -> float:

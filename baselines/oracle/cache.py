@@ -72,7 +72,7 @@ def solve(
     known = kept(scenario, seed, how, arm_seed) if on_disk else None
     if known is not None:
         return known
-    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario)
+    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario, seed)
     if _same(true, plain):
         optimum = search(true, seed, how, tick, paths)
     else:
@@ -101,7 +101,7 @@ def keep(optimum: Optimum, scenario: Scenario, seed: int, how: Search, arm_seed:
 
 def _place(scenario: Scenario, seed: int, how: Search, arm_seed: int | None) -> pathlib.Path:
     true = stripped(scenario, seed, arm_seed)
-    return file_of(true, seed, how, polished=not _same(true, ideal(scenario)))
+    return file_of(true, seed, how, polished=not _same(true, ideal(scenario, seed)))
 
 
 def _same(one: Scenario, other: Scenario) -> bool:

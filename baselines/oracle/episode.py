@@ -12,6 +12,7 @@ from gymnasium.utils import seeding
 from baselines.episodes import add_up, play
 from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance, swept
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from ikgym.exceptions import InvalidInputError
@@ -23,6 +24,8 @@ from ikgym.validation import FloatArray, whole_number
 
 # Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.
 FIRST = 8
+# Least distance of bodies at the knots, in [m]. Between two of them it may be less, and at 1 µm the plant stops the arm.
+CLEARANCE = 1e-4
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,6 +42,7 @@ class EpisodeProblem:
         start: Joint coordinates at the start in [rad] or [m]. Shape (n,).
         nominal: Nominal task coordinates after the steps 1, 2, … Shape (steps, m).
         grid: K knots, one a step that counts.
+        clearance: Bodies and obstacles of the episode; None where touching does not matter.
     """
 
     scenario: Scenario
@@ -47,6 +51,7 @@ class EpisodeProblem:
     start: FloatArray
     nominal: FloatArray
     grid: Grid
+    clearance: Clearance | None
 
     @classmethod
     def of(cls, scenario: Scenario, seed: int) -> Self:
@@ -84,13 +89,15 @@ class EpisodeProblem:
         grid = Grid(at, np.maximum(held - 1.0, 1.0), np.ones(len(at)), (held == 1).astype(np.float64))
         trajectory = scenario.trajectory.sample(seeding.np_random(seed)[0])
         start = np.array(scenario.first_q(trajectory), dtype=np.float64)
-        return cls(scenario, seed, data, start, np.ascontiguousarray(scenario.nominal(seed)[1:]), grid)
+        nominal = np.ascontiguousarray(scenario.nominal(seed)[1:])
+        return cls(scenario, seed, data, start, nominal, grid, _clearance(scenario, seed))
 
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
         change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
         rest = np.zeros_like(self.start)
-        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, self._load(grid))
+        load, clearance = self._load(grid), self.clearance
+        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, load, clearance)
 
     def _load(self, grid: Grid) -> FloatArray:
         """Offset of the joint zeros by the payload at the knots; (0, n) where there is none. Shape (K, n)."""
@@ -102,7 +109,8 @@ class EpisodeProblem:
     @property
     def _by_interior_point(self) -> bool:
         """Whether paths are improved by the interior point method, which finds its way between limits of any kind."""
-        return self.scenario.arm.limited and bool(self.scenario.counted()[1:].all())
+        limited = self.scenario.arm.limited or self.clearance is not None
+        return limited and bool(self.scenario.counted()[1:].all())
 
     @property
     def knots(self) -> int:
@@ -161,14 +169,16 @@ class EpisodeProblem:
         """Plays joint velocities (steps, n) in [rad/s] or [m/s] in the environment.
 
         Returns:
-            Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost.
+            Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost; infinite where
+            bodies touch at a step or between two, so that the arm is stopped.
         """
         actions = iter(qdot / self.scenario.velocity_limit)
         played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
-        q, costs = np.empty_like(qdot), np.empty(len(qdot))
+        q, costs, stopped = np.empty_like(qdot), np.empty(len(qdot)), False
         for k, out in enumerate(played):
             q[k], costs[k] = out.true_q[0], out.tracking_cost[0] + out.velocity_cost[0]
-        return q, float(add_up(costs))
+            stopped = stopped or bool(out.stopped.any())
+        return q, np.inf if stopped else float(add_up(costs))
 
 
 def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
@@ -181,3 +191,13 @@ def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
         return action
 
     return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])
+
+
+def _clearance(scenario: Scenario, seed: int) -> Clearance | None:
+    """Bodies and obstacles of an episode, at each of its steps; None where touching does not matter."""
+    if not scenario.collides:
+        return None
+    own = scenario.replace(obstacles=scenario.obstacles_of(seed))
+    boxes, checked = own.obstacle_rows(scenario.steps + 1), own.surroundings.checked
+    shapes = scenario.arm.bodies.shapes
+    return Clearance(shapes, boxes, checked, swept(scenario.arm), CLEARANCE, CLEARANCE + INFLUENCE)

@@ -155,5 +155,6 @@ def _blend(a, b, middle, width, out):
 def _newton(problem, knots, n):
     """Workspace and multipliers of Newton's method."""
     kind, m = problem.data.kind, problem.nominal.shape[1]
-    workspace = newton_workspace(kind, m, knots, n, problem.change_limit.shape[0] > 0)
+    limited = problem.change_limit.shape[0] > 0
+    workspace = newton_workspace(kind, m, knots, n, limited, problem.clearance)
     return workspace, np.empty((knots, task_kernels.error_size(kind, m) + 2 * n))

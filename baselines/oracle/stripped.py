@@ -31,12 +31,21 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
     drawn = scenario.drawn_plant(seed, arm_seed)
     kept = Plant(payload=drawn.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
     start = scenario.start_of(seed, arm_seed) if scenario.jogs else scenario.start
-    return scenario.replace(arm=drawn.arm, model=scenario.model, plant=kept, start=start)
+    return scenario.replace(
+        arm=drawn.arm, model=scenario.model, plant=kept, start=start, obstacles=scenario.obstacles_of(seed)
+    )
 
 
-def ideal(scenario: Scenario) -> Scenario:
-    """The scenario with the arm of the data sheet, ideally driven and measured."""
-    return scenario if scenario.plant.ideal else scenario.replace(plant=Plant())
+def ideal(scenario: Scenario, seed: int | None = None) -> Scenario:
+    """The scenario with the arm of the data sheet, ideally driven and measured.
+
+    Args:
+        scenario: The scenario.
+        seed: The reset seed whose obstacles it keeps; an ideal plant alone would have others drawn.
+    """
+    if scenario.plant.ideal:
+        return scenario
+    return scenario.replace(plant=Plant(), **({} if seed is None else {"obstacles": scenario.obstacles_of(seed)}))
 
 
 def strips(scenario: Scenario) -> bool:

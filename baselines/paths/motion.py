@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines import registry
@@ -15,6 +18,7 @@ from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.durations import duration
 from ikgym.simulator import Simulator
+from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray
 
 
@@ -28,6 +32,9 @@ class Motion:
         position_error: In [m]. Shape (k, N).
         orientation_error: In [rad]; 0 where the task has no orientation. Shape (k, N).
         held_back: Joints that the limits of the arm held back in each step. Shape (k, N).
+        clearance: Smallest signed distance between bodies in [m], infinite where nothing can meet. Shape (k, N).
+        pair: The closest pair, and the one that touched at a stop; -1 where nothing can meet. Shape (k, N, 2).
+        stopped: 1 where bodies have touched and the arm stands still. Shape (k, N).
     """
 
     times: FloatArray
@@ -35,11 +42,14 @@ class Motion:
     position_error: FloatArray
     orientation_error: FloatArray
     held_back: FloatArray
+    clearance: FloatArray
+    pair: npt.NDArray[np.int64]
+    stopped: FloatArray
 
     def of(self, row: int) -> Motion:
         """The motion from one of the starts."""
-        errors = (x[:, row : row + 1] for x in (self.position_error, self.orientation_error, self.held_back))
-        return Motion(self.times, self.q[:, row : row + 1], *errors)
+        columns = {name: values[:, row : row + 1] for name, values in vars(self).items() if name != "times"}
+        return dataclasses.replace(self, **columns)
 
 
 def path_duration(scenario: Scenario) -> float:
@@ -62,8 +72,14 @@ def ideal(scenario: Scenario, **changes: object) -> Scenario:
     return scenario.replace(**{"model": scenario.arm, **usual, "steps": max(steps, 2), **changes})
 
 
+def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> dict[str, Any]:
+    """The path and the motions of the obstacles in another time, as changes of the scenario."""
+    obstacles = (one if one.motion is None else one.replace(motion=timing(one.motion)) for one in scenario.obstacles)
+    return {"trajectory": timing(scenario.trajectory), "obstacles": tuple(obstacles)}
+
+
 def played(scenario: Scenario, starts: FloatArray) -> Motion:
-    """`qp` on a scenario.
+    """`qp` on a scenario; where it has collisions, the starts have to be clear.
 
     Args:
         scenario: A result of :func:`ideal`.
@@ -73,12 +89,14 @@ def played(scenario: Scenario, starts: FloatArray) -> Motion:
     simulator = Simulator(scenario, rows, policy.preview)
     simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(0)[0]] * rows, starts)
     out, state = simulator.observe(), None
-    q, errors = [out.true_q], []
+    q, errors, free = [out.true_q], [], (np.full(rows, np.inf), np.full((rows, 2), -1), np.zeros(rows))
     for _ in range(scenario.steps):
         action, state = policy.predict(observation(out), state)
         out = simulator.step(action)
         q.append(out.true_q)
-        errors.append((out.position_error, out.orientation_error, out.at_limit))
-    position, orientation, at_limit = (np.array(column) for column in zip(*errors, strict=True))
+        met = (out.clearance, out.pair, out.stopped) if scenario.collides else free
+        errors.append((out.position_error, out.orientation_error, out.at_limit, *met))
+    position, orientation, at_limit, clearance, pair, stopped = map(np.array, zip(*errors, strict=True))
     times = scenario.dt * np.arange(scenario.steps + 1, dtype=np.float64)
-    return Motion(times, np.array(q), position, np.nan_to_num(orientation), at_limit.sum(axis=-1))
+    held_back, met = at_limit.sum(axis=-1), (clearance, pair.astype(np.int64), stopped)
+    return Motion(times, np.array(q), position, np.nan_to_num(orientation), held_back, *met)

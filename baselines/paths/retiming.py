@@ -110,6 +110,11 @@ def refusal(found: Survey) -> str:
     time = best.reached * found.duration
     x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
     where = f"from {time:.3g} s on, at ({', '.join(f'{one:.4g}' for one in x)}) m"
+    if (met := best.contact) is not None and met.touched:
+        first, second = met.pair
+        return (
+            f"no start leads along all of it clear. In the farthest {first!r} and {second!r} touch at {met.time:.3g} s."
+        )
     return f"no start reaches all of it. The farthest misses poses {where}, and by up to {far}."
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.paths.motion import ideal, played
+from baselines.paths.motion import ideal, in_time, played
 from ikgym.arms import Arm
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.contacts import pair_names
+from ikgym.solids import closest
 from ikgym.trajectories import RetimedTrajectory
 from ikgym.validation import FloatArray
 
@@ -22,18 +25,38 @@ def starts(scenario: Scenario) -> FloatArray:
     """Joint coordinates at the first pose of a path, one a branch, the scenario's own first; shape (N, n).
 
     Most of them are where `qp` leads redundant joints while the pose is held, so that they are at rest when the path
-    begins; few others are not.
+    begins; few others are not. Where the scenario has collisions, all of them are clear.
 
     Args:
         scenario: A result of :func:`baselines.paths.motion.ideal`.
+
+    Raises:
+        InvalidInputError: No posture at the first pose is clear.
     """
-    own = scenario.first_q(scenario.trajectory)[None]
-    found = solutions(scenario)
+    own, found = scenario.first_q(scenario.trajectory)[None], solutions(scenario)
+    if scenario.collides:
+        own, found = _clear(scenario, own, found)
     if not len(found):
         return own
     settled = played(_held(scenario), _middlemost(scenario.arm, found))
     still = settled.q[-1][settled.position_error[-1] < 1e-6]
     return _distinct(scenario.arm, _distinct(scenario.arm, own, still, BRANCHES), found, BRANCHES)
+
+
+def _clear(scenario: Scenario, own: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Those that touch nothing of the scenario's own start, of shape (1, n), and of others, of shape (k, n)."""
+    every = np.vstack([own, found])
+    pairs = closest(scenario.arm, every, scenario.obstacle_rows(1), scenario.surroundings.checked)
+    clear = pairs.distances > 0.0
+    if not clear.any():
+        best = int(np.argmax(pairs.distances))
+        first, second = pair_names(scenario, pairs.pairs[best].tolist())
+        raise InvalidInputError(
+            f"Scenario {scenario.name!r}: expected a posture at the first pose that touches nothing, got none among "
+            f"{len(every)}; in the best of them {first!r} and {second!r} overlap by {-1e3 * pairs.distances[best]:.3g} "
+            "mm. A pair that may touch is named by `ignored` of the bodies or of the obstacle."
+        )
+    return own[clear[:1]], found[clear[1:]]
 
 
 def solutions(scenario: Scenario) -> FloatArray:
@@ -63,8 +86,8 @@ def _rotations(frame: FloatArray, errors: int, rng: np.random.Generator) -> Floa
 def _held(scenario: Scenario) -> Scenario:
     """The first pose, held."""
     ends = np.array([0.0, SETTLING])
-    held = RetimedTrajectory(scenario.trajectory, ends, np.zeros(2), np.zeros(2))
-    return ideal(scenario, trajectory=held, dt=PERIOD)
+    held = in_time(scenario, lambda one: RetimedTrajectory(one, ends, np.zeros(2), np.zeros(2)))
+    return ideal(scenario, **held, dt=PERIOD)
 
 
 def _ranges(arm: Arm) -> tuple[FloatArray, FloatArray]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import NamedTuple
 
 import numpy as np
 
-from baselines.paths.motion import Motion, ideal, path_duration, played
+from baselines.paths.motion import Motion, ideal, in_time, path_duration, played
 from baselines.paths.starts import starts
 from baselines.paths.timing import JointPath, Limits, Timing, shortest
 from ikgym.scenarios import Scenario
+from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray
 
 #: Errors in [m] and [rad] within which a pose of the path counts as reached.
@@ -31,6 +33,24 @@ FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: of these rooms, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
 #: with more than the last share of a velocity limit, where accelerations are not limited.
 SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.3, 0.1
+#: A clearance in [m] below the first of these is too small for a real arm; more than the second is no better.
+CLOSE, CLEAR = 0.005, 0.05
+
+
+class Contact(NamedTuple):
+    """How close bodies come to each other and to obstacles along a path.
+
+    Attributes:
+        clearance: The smallest signed distance until they touch, in [m].
+        pair: The names of the two that are closest, or that touch.
+        time: When they do, were the motion as fast as asked, in [s].
+        touched: Whether they touch, so that the path cannot be followed further.
+    """
+
+    clearance: float
+    pair: tuple[str, str]
+    time: float
+    touched: bool
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,6 +68,7 @@ class Branch:
         acceleration: The same of accelerations, in [rad/s²] or [m/s²]. Shape (n,).
         leap: The largest share of a velocity limit in the first control period, from rest.
         room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
+        contact: How close bodies come; None where nothing can meet.
         shortest: The shortest timing of this motion in which all limits hold; None if poses are missed.
         asked: The same, nowhere faster than asked.
     """
@@ -62,6 +83,7 @@ class Branch:
     acceleration: FloatArray
     leap: float
     room: FloatArray
+    contact: Contact | None
     shortest: Timing | None
     asked: Timing | None
 
@@ -71,17 +93,19 @@ class Branch:
         return self.asked is not None and self.shortest is not None
 
     def rank(self) -> tuple[float, ...]:
-        """The smaller, the better: by share of the path, time as asked, a given start, room, shortest time."""
+        """The smaller, the better: share of the path, time, a given start, clearance, room, shortest time."""
         if self.asked is None or self.shortest is None:
             return -self.reached, self.position_error
         slowing = max(self.asked.duration / self.asked.progress[-1], SLOWING)
         room = float(self.room.min())
         enough = min(round(room, 1), ENOUGH)
+        clearance = np.inf if self.contact is None else self.contact.clearance
         return (
             -2.0,
-            room < NARROW or self.leap > LEAP,
+            room < NARROW or self.leap > LEAP or clearance < CLOSE,
             round(slowing, 2),
             not self.given,
+            -min(round(clearance, 2), CLEAR),
             -enough,
             self.shortest.duration,
         )
@@ -122,22 +146,24 @@ class Survey:
 
 
 def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
-    """Whether all poses are met within errors in [m] and [rad], and no limit of the arm holds back a joint."""
+    """Whether poses are met within errors in [m] and [rad], no limit holds back a joint, and nothing touches."""
     position, orientation = motion.position_error.max(), motion.orientation_error.max()
-    return bool(position <= errors[0] and orientation <= errors[1] and not motion.held_back.any())
+    free = not motion.held_back.any() and not motion.stopped.any()
+    return bool(position <= errors[0] and orientation <= errors[1] and free)
 
 
 def survey(scenario: Scenario) -> Survey:
     """Follows a path from several start branches, and times each of them.
 
     Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
-    them `qp` plays the path in the time asked for and, while it misses poses, slower.
+    them `qp` plays the path in the time asked for and, while it misses poses, slower, obstacles with it. Where the
+    scenario has collisions, branches begin clear, and end where bodies touch.
 
     Args:
         scenario: A scenario whose path is the same at every reset. Its plant is taken to be ideal.
 
     Raises:
-        InvalidInputError: The path is random, or its first pose is out of reach.
+        InvalidInputError: The path is random, its first pose is out of reach, or none of its postures is clear.
         ModuleNotFoundError: toppra is not installed.
     """
     duration = path_duration(scenario)
@@ -167,8 +193,7 @@ def _branches(scenario: Scenario, starts: FloatArray, slowing: float) -> list[Br
     """Branches from starts of shape (N, n), played in so many times the time that is asked for."""
     timing = Timing.uniform(path_duration(scenario), slowing)
     dt = timing.duration / min(max(timing.duration / scenario.dt, FEWEST_STEPS), MOST_STEPS)
-    trajectory = timing.of(scenario.trajectory)
-    motion = played(ideal(scenario, trajectory=trajectory, start=starts[0], dt=dt), starts)
+    motion = played(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts)
     return [branch_of(scenario, motion.of(row), timing) for row in range(len(starts))]
 
 
@@ -207,6 +232,18 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
         acceleration=np.abs(np.diff(moving, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
         leap=float((np.abs(q[1] - q[0]) / dt / scenario.largest_qdot).max()),
         room=np.minimum(q - arm.lower, arm.upper - q).min(axis=0),
+        contact=_contact(scenario, motion, slowing),
         shortest=timings[0],
         asked=timings[1],
     )
+
+
+def _contact(scenario: Scenario, motion: Motion, slowing: float) -> Contact | None:
+    """How close bodies come in the motion of one start, played in so many times the time that is asked for."""
+    if motion.pair[0, 0, 0] < 0:
+        return None
+    stops = np.flatnonzero(motion.stopped[:, 0])
+    until = motion.clearance[: stops[0] + 1, 0] if len(stops) else motion.clearance[:, 0]
+    step = int(stops[0] if len(stops) else until.argmin())
+    pair = pair_names(scenario, motion.pair[step, 0].tolist())
+    return Contact(float(until.min()), pair, float(motion.times[step + 1]) / slowing, len(stops) > 0)

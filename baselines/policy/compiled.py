@@ -14,6 +14,7 @@ from baselines.policy.arguments import Parts, not_finite
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
+from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.validation import FloatArray
 
@@ -29,10 +30,25 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     sees_extras: ClassVar[bool] = False
     #: The kernel.
     step: ClassVar[Callable[..., None]]
+    #: The kernel among bodies, with the numbers of :meth:`numbers_among`; None for a policy that is blind to them.
+    step_among: ClassVar[Callable[..., None] | None] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(sees_extras=self.among_bodies and self.problem.obstacles_shown)
 
     @abc.abstractmethod
     def numbers(self) -> NamedTuple:
         """The parameters as the kernel takes them: a named tuple of numbers and arrays."""
+
+    def numbers_among(self) -> NamedTuple:
+        """The parameters of the kernel among bodies; the last are the obstacles, of shape (1, o, 16) or (B, o, 16)."""
+        raise NotImplementedError
+
+    @property
+    def among_bodies(self) -> bool:
+        """Whether there are bodies that the policy keeps clear of."""
+        return type(self).step_among is not None and self.problem.surroundings is not None
 
     def memory(self, rows: int) -> Memory:
         """See :meth:`SolverPolicy.memory`; nothing."""
@@ -44,7 +60,10 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         rows, n = batch.q.shape
         call, block, numbers, _ = self._kernel
         answer, kept = np.empty(rows * (n + 2), np.int64), tuple([array.copy() for array in memory])
-        call(block, numbers, False, _flat(batch), kept, np.empty(0, np.float32), answer)  # nothing is cut here
+        parts: Parts = self._flat(batch)
+        if self.sees_extras:
+            parts, numbers = self._told(parts, numbers)
+        call(block, numbers, False, parts, kept, np.empty(0, np.float32), answer)  # nothing is cut here
         qdot, status, iterations = parts_of(answer, rows, n)
         return Solution(qdot, self._named(kept), status, iterations)
 
@@ -52,7 +71,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         """See :meth:`SolverPolicy.act`; in one call of the kernel, unless threads share out the rows."""
         if not self._undivided(len(batch.q)):
             return super().act(batch, memory)
-        action, after = self._step(_flat(batch), len(batch.q), memory, False)
+        action, after = self._step(self._flat(batch), len(batch.q), memory, False)
         return action.reshape(batch.q.shape), after
 
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
@@ -62,7 +81,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         rows = len(parts[0])
         if not self._undivided(rows):
             return super()._answer(parts, single, memory)
-        action, after = self._step(_flat(parts), rows, memory, True)
+        action, after = self._step(self._flat(parts), rows, memory, True)
         return action.reshape(parts[0].shape), after
 
     def _step(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Memory]:
@@ -79,18 +98,39 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         call, block, numbers, n = self._kernel
         action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
         kept = tuple([array.copy() for array in memory])
+        if self.sees_extras:
+            parts, numbers = self._told(parts, numbers)
         return action, answer, kept, call(block, numbers, checking, parts, kept, action, answer)
+
+    def _flat(self, parts: Parts) -> Parts:
+        """The arrays of a batch as :func:`entry` takes them, and the obstacles as they are, where they are shown."""
+        q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
+        ahead = nominal.reshape(-1, nominal.shape[2])
+        flat = q.reshape(-1), qdot.reshape(-1), pose.reshape(-1), ahead, remaining.reshape(-1)
+        return (*flat, parts[-1]) if self.sees_extras else flat
+
+    def _told(self, parts: Parts, numbers: tuple[Any, ...]) -> tuple[Parts, tuple[Any, ...]]:
+        """The five arrays of an observation, and the numbers with the obstacles that it shows."""
+        shown, expected = parts[-1], numbers[-1].shape[1:]
+        if shown is None or shown.shape[-2:] != expected:
+            got = "none" if shown is None else shown.shape
+            raise InvalidInputError(f"observation['obstacles']: {self.name} expects shape {expected}, got {got}.")
+        return parts[: len(OBSERVED)], (*numbers[:-1], shown.reshape(-1, *expected))
 
     @functools.cached_property
     def _kernel(self) -> tuple[Any, FloatArray, tuple[Any, ...], int]:
         """The compiled call, its arguments that never change, and the number of joints."""
-        numbers, n, m = self.numbers(), self.problem.model.joints, self.problem.task.size
-        call = _entry(type(self).step, type(numbers), type(self._example))
-        if type(self) not in compiled_classes:
+        n, m, among = self.problem.model.joints, self.problem.task.size, self.among_bodies
+        numbers = self.numbers_among() if among else self.numbers()
+        step = type(self).step_among if among else type(self).step
+        call, kept = _entry(step, type(numbers), type(self._example)), tuple(numbers)
+        if call not in compiled_classes:
             with self._first_call():
-                self.__dict__["_kernel"] = call, _block(self.problem), tuple(numbers), n
-                self._call((*np.empty((3, 0)), np.empty((0, m)), np.empty(0)), 0, tuple(self.memory(0)), False)
-        return call, _block(self.problem), tuple(numbers), n
+                compiled_classes.add(call)
+                nothing = (*np.empty((3, 0)), np.empty((0, m)), np.empty(0))
+                memory, out = tuple(self.memory(0)), (np.empty(0, np.float32), np.empty(0, np.int64))
+                call(_block(self.problem), kept, False, nothing, memory, *out)
+        return call, _block(self.problem), kept, n
 
 
 #: One compiled call for each kernel and the types of its arguments.
@@ -102,15 +142,3 @@ def _block(problem: Problem) -> FloatArray:
     model = problem.model
     limits = problem.velocity_limit, model.lower, model.upper, problem.largest_qdot
     return model_block(model.chain, problem.task.kind, problem.dt, *limits)
-
-
-def _flat(parts: Parts) -> Parts:
-    """The arrays of a batch as :func:`entry` takes them."""
-    q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
-    return (
-        q.reshape(-1),
-        qdot.reshape(-1),
-        pose.reshape(-1),
-        nominal.reshape(-1, nominal.shape[2]),
-        remaining.reshape(-1),
-    )

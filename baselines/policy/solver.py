@@ -43,8 +43,8 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, Frozen
 
-#: Policies that have solved something in this process, and so are compiled.
-compiled_classes: set[type] = set()
+#: Policies that have solved something in this process, and calls of kernels that have been made: they are compiled.
+compiled_classes: set[Any] = set()
 
 #: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
 #: wait for others of it wait forever.
@@ -72,7 +72,7 @@ class SolverPolicy(Frozen, abc.ABC):
     example: ClassVar[bool] = False
     #: Whether it is a solver of another project, whose package is installed with the extra `rivals`.
     rival: ClassVar[bool] = False
-    #: Whether it is shown the ages of measurements and past commands, where an observation has them.
+    #: Whether it is shown the ages of measurements, past commands and obstacles, where an observation has them.
     sees_extras: ClassVar[bool] = True
     #: Whether `predict` accepts the observations of several arms at once.
     batched: ClassVar[bool] = True

@@ -58,14 +58,15 @@ class DrawnArm:
 
     def __init__(self, server: Any, root: str, arm: Arm, colour: Colour, shapes: list[Shape] | None = None) -> None:
         self._scene, self._arm = server.scene, arm
-        self._names = [root]
+        #: Names of the frames, that of the base first.
+        self.names = [root]
         for joint in range(arm.joints):
-            self._names.append(f"{self._names[-1]}/joint_{joint}")
-        self._frames = [self._scene.add_frame(name, show_axes=False) for name in self._names[1:]]
+            self.names.append(f"{self.names[-1]}/joint_{joint}")
+        self._frames = [self._scene.add_frame(name, show_axes=False) for name in self.names[1:]]
         self._joints = self._cylinders(colour) if shapes is None else []
         for number, shape in enumerate(shapes or ()):
-            self._scene.add_mesh_trimesh(f"{self._names[shape.frame]}/mesh_{number}", shape.mesh)
-        ball = f"{self._names[-1]}/tool"
+            self._scene.add_mesh_trimesh(f"{self.names[shape.frame]}/mesh_{number}", shape.mesh)
+        ball = f"{self.names[-1]}/tool"
         self._tool = self._scene.add_icosphere(ball, radius=TOOL * size(arm), color=FREE, position=arm.tool)
 
     def show(self, q: FloatArray, reading: Reading) -> None:
@@ -94,7 +95,7 @@ class DrawnArm:
         self, frame: int, name: str, ends: tuple[FloatArray, FloatArray], radius: float, colour: Colour
     ) -> Any:
         mesh = trimesh.creation.cylinder(radius, segment=ends, sections=24)
-        return self._scene.add_mesh_simple(f"{self._names[frame]}/{name}", mesh.vertices, mesh.faces, color=colour)
+        return self._scene.add_mesh_simple(f"{self.names[frame]}/{name}", mesh.vertices, mesh.faces, color=colour)
 
 
 def joint_frames(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import sys
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,8 +20,10 @@ from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import Surroundings
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
+from ikgym.solids import solids_of
 from ikgym.validation import FloatArray, whole_number
 
 # Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
@@ -82,6 +85,22 @@ class Stage:
         shift = shift or SLOW * length * whole.dt
         errors = float(out.position_error[0]), float(out.orientation_error[0])
         return cls(shown, seed, start, frames[: shown.steps + 1], errors, (shift, shift / (LENGTH_OF_RADIAN * length)))
+
+    @functools.cached_property
+    def boxes(self) -> FloatArray:
+        """The obstacles after 0, 1, … steps, once if none moves, see :func:`ikgym.solids.solids_of`."""
+        scenario = self.scenario
+        return solids_of(scenario.obstacles_of(self.seed), scenario.times(scenario.steps + 1), scenario.model)
+
+    def obstacles(self, step: int) -> FloatArray:
+        """The obstacles after so many steps. Shape (o, 16)."""
+        now: FloatArray = self.boxes[min(step, len(self.boxes) - 1)]
+        return now
+
+    @property
+    def around(self) -> Surroundings | None:
+        """The obstacles as they are at the start, where touching them matters."""
+        return self.scenario.surroundings if self.scenario.collides else None
 
 
 class Replay(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 
 from baselines.evaluation.plots.style import COLOURS
 from baselines.viewer.arms import DrawnArm, Shape
+from baselines.viewer.bodies import DrawnBodies
 from baselines.viewer.readings import Colour
 from baselines.viewer.replay import size
 from baselines.viewer.session import Mode, Session, Shown
@@ -37,11 +38,14 @@ class Scene:
         self._scene.add_grid("/floor", width=floor, height=floor, cell_size=whole / 4)
         axes = {"show_axes": oriented, "axes_length": AXES * whole, "axes_radius": AXES_RADIUS * whole}
         self._arms, self._references, self._paths = [], [], []
+        self._bodies: list[DrawnBodies] = []
         for i, replay in enumerate(session.replays):
             root, colour = f"/policy_{i}", _rgb(COLOURS[i % len(COLOURS)])
             self._scene.add_frame(root, show_axes=False, position=(0.0, -APART * whole * i, 0.0))
             self._scene.add_label(f"{root}/name", replay.policy, position=(0.0, 0.0, -BELOW * whole))
             self._arms.append(DrawnArm(server, f"{root}/arm", arm, colour, shapes))
+            if session.has_bodies:
+                self._bodies.append(DrawnBodies(server, self._arms[-1].names, stage, colour))
             self._references.append(self._scene.add_frame(f"{root}/reference", **axes))
             self._scene.add_icosphere(f"{root}/reference/ball", radius=BALL * whole, color=_rgb(GREEN))
             _, tool = arm.forward(thinned(replay.q, step))
@@ -69,12 +73,19 @@ class Scene:
         camera.position = (0.9 * far, middle + 0.3 * far, (0.3 + LOOKED_AT) * far)
         camera.look_at = (0.0, middle, LOOKED_AT * self._size)
 
+    def show_bodies(self, on: bool) -> None:
+        """Shows bodies, obstacles and closest pairs, or none of them."""
+        for bodies in self._bodies:
+            bodies.switch(on=on)
+
     def show(self, shown: Sequence[Shown]) -> None:
         """Moves the arms and the reference."""
         mode, reference = self._session.mode, self._session.reference
         for arm, frame, one in zip(self._arms, self._references, shown, strict=True):
             arm.show(one.q, one.reading)
             _move(frame, reference)
+        for bodies, one in zip(self._bodies, shown, strict=False):  # there may be none
+            bodies.show(one.closest, self._session.obstacles)
         for path in self._paths:
             path.visible = mode is Mode.PLAY
         if mode is Mode.FOLLOW:

@@ -54,6 +54,9 @@ class Viewer:
         self.scene.target.on_update(self._dragged)
         server.on_client_connect(lambda client: self.scene.look(client.camera))
         gui.add_markdown(f"**{escaped(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
+        if session.has_bodies:
+            self.bodies = gui.add_checkbox("bodies and obstacles", stage.scenario.collides)
+            self._on_user([self.bodies], self.scene.show_bodies)
         with gui.add_folder("Episode"):
             self.play = gui.add_button("Play")
             self.time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)

@@ -14,6 +14,8 @@ from baselines.status import Status
 from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
 from baselines.viewer.replay import Stage, play_all
+from ikgym.scenarios.contacts import pair_names
+from ikgym.solids import Closest, closest
 from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.
@@ -41,6 +43,7 @@ class Shown(NamedTuple):
         cost: Accumulated cost of the episode, NaN outside of it.
         status: Status of the policy's last step.
         reading: Manipulability and limits.
+        closest: The closest pair of bodies and obstacles.
     """
 
     policy: str
@@ -50,6 +53,7 @@ class Shown(NamedTuple):
     cost: float
     status: str
     reading: Reading
+    closest: Closest
 
 
 class Session:
@@ -85,6 +89,17 @@ class Session:
     def reference(self) -> FloatArray:
         """The reference: rotation and position in [m]. Shape (12,)."""
         return self.stage.frames[self.step] if self.mode is Mode.PLAY else self._approach.frame
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether there are bodies or obstacles to show."""
+        scenario = self.stage.scenario
+        return bool(len(scenario.arm.bodies) or scenario.obstacles)
+
+    @property
+    def obstacles(self) -> FloatArray:
+        """The obstacles now; where the episode was left, they stand still. Shape (o, 16)."""
+        return self.stage.obstacles(self.step)
 
     def place(self, q: FloatArray) -> None:
         """Puts all arms at joint coordinates in [rad] or [m], cut to the limits, and the target at their tool. (n,)."""
@@ -164,7 +179,10 @@ class Session:
         else:
             q, status = following.q, following.status
             position, orientation = following.errors(self._approach)
-        return Shown(replay.policy, q, float(position), float(orientation), float(cost), status, self._reader.read(q))
+        scenario = self.stage.scenario
+        pair = closest(scenario.arm, q[None], self.obstacles[None], scenario.surroundings.checked)
+        errors = float(position), float(orientation)
+        return Shown(replay.policy, q, *errors, float(cost), status, self._reader.read(q), pair)
 
     def _readings(self, one: Shown) -> str:
         """A heading and a list."""
@@ -179,6 +197,9 @@ class Session:
         if np.isfinite(reading.margins[joint]):
             margin = f"{reading.margins[joint]:.3g} {'m' if arm.prismatic[joint] else 'rad'}"
             lines.append(f"- {escaped(arm.joint_names[joint])} is {margin} from its limit")
+        if self.stage.scenario.collides and np.isfinite(one.closest.distances[0]):
+            pair = pair_names(self.stage.scenario, one.closest.pairs[0].tolist())
+            lines.append(f"- {1e3 * one.closest.distances[0]:.1f} mm between {' and '.join(map(escaped, pair))}")
         if np.isfinite(one.cost):
             lines.append(f"- cost so far {one.cost:.4g}")
         return "\n".join(lines)

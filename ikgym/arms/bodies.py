@@ -17,12 +17,16 @@ from ikgym.validation import (
     FloatArray,
     Frozen,
     IntArray,
+    float_array,
     frozen_array,
     known_names,
     read_only,
     shortened,
     whole_number,
 )
+
+#: More bodies than an arm has.
+MOST_BODIES = 1000
 
 
 class Neighbour(Protocol):
@@ -52,7 +56,7 @@ class Bodies(Frozen):
     ignored. Bodies of the base do not meet obstacles.
 
     Args:
-        names: k different texts.
+        names: k different texts, at most 1000.
         links: Numbers of the links. Shape (k,).
         starts: One end of each body in the frame of its link, in [m]. Shape (k, 3).
         ends: The other end, in [m]; the starts if left out. Shape (k, 3).
@@ -75,10 +79,9 @@ class Bodies(Frozen):
 
     def __post_init__(self) -> None:
         names = _names(self.names)
-        links = [whole_number("links of bodies", link, at_least=0) for link in self.links]
-        starts = frozen_array("starts of bodies", np.reshape(self.starts, (-1, 3)), (len(names), 3), at_most=LARGEST)
-        ends = starts if self.ends is None else np.reshape(self.ends, (-1, 3))
-        ends = frozen_array("ends of bodies", ends, starts.shape, at_most=LARGEST)
+        links = [whole_number("links of bodies", link, at_least=0) for link in _listed("links", self.links)]
+        starts = _points("starts of bodies", self.starts, len(names))
+        ends = starts if self.ends is None else _points("ends of bodies", self.ends, len(names))
         radii = frozen_array("radii of bodies", self.radii, (len(names),), at_most=LARGEST)
         if len(links) != len(names):
             raise InvalidInputError(f"links of bodies: expected {len(names)} numbers, got {len(links)}.")
@@ -182,22 +185,35 @@ class Bodies(Frozen):
             known_names("body", one.ignored, self.names)
             meets = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
             checked += [meets] * one.count
-        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(-1, len(self)))
+        return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(len(boxes), len(self)))
 
 
 def _names(given: Any) -> tuple[str, ...]:
-    names = tuple(given) if isinstance(given, (tuple, list)) else ()
+    names = _listed("names", given)
+    if len(names) > MOST_BODIES:
+        raise InvalidInputError(f"names of bodies: expected at most {MOST_BODIES}, got {len(names)}.")
     texts = {one for one in names if isinstance(one, str) and one}
-    if len(names) != len(given) or len(texts) != len(names):
+    if len(texts) != len(names):
         raise InvalidInputError(f"names of bodies: expected different texts, got {shortened(given)}.")
     return names
 
 
+def _points(name: str, given: npt.ArrayLike, count: int) -> FloatArray:
+    points = float_array(name, given, at_most=LARGEST)
+    return frozen_array(name, points if points.size else np.zeros((0, 3)), (count, 3))
+
+
 def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     pairs = []
-    for pair in given:
-        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+    for pair in _listed("ignored pairs", given):
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
             raise InvalidInputError(f"ignored pairs of bodies: expected two names each, got {shortened(pair)}.")
         known_names("body", pair, names)
         pairs.append((pair[0], pair[1]))
     return tuple(pairs)
+
+
+def _listed(name: str, given: Any) -> tuple[Any, ...]:
+    if not isinstance(given, (tuple, list, np.ndarray)):
+        raise InvalidInputError(f"{name} of bodies: expected a list, got {shortened(given)}.")
+    return tuple(given)

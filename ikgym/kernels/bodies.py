@@ -270,6 +270,10 @@ def nearest(shapes, boxes, checked, placed, core, within, near):
 def gradient(prismatic, shapes, joints, first, second, vector, out):
     """The gradient of the signed distance of a pair by the joints, in [m] per unit of joint coordinate.
 
+    The distance has kinks, where the nearest points jump and this is the gradient on one side: parallel segments, a
+    segment along an edge or a face of a box or of a half-space, one as deep in a box by two of its faces or edges, and
+    cores that cross.
+
     Args:
         prismatic: True where a joint is prismatic. Shape (n,).
         shapes: The bodies, :class:`Shapes`.

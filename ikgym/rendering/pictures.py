@@ -21,7 +21,9 @@ class Pictures:
     def __init__(self, simulator: Simulator, row: int, mode: str) -> None:
         scenario = simulator.scenario
         self._simulator, self._row, self._human = simulator, row, mode == "human"
-        self.renderer = Renderer(scenario.arm, mode, title=scenario.name, has_orientation=scenario.task.has_orientation)
+        around = scenario.surroundings if scenario.collides else None
+        oriented = scenario.task.has_orientation
+        self.renderer = Renderer(scenario.arm, mode, title=scenario.name, has_orientation=oriented, surroundings=around)
 
     def begin(self, position_error: float, orientation_error: float) -> None:
         """Records the first state of an episode, with its errors in [m] and [rad]."""
@@ -32,8 +34,8 @@ class Pictures:
     def add(self, position_error: float, orientation_error: float) -> None:
         """Records a state, with its errors in [m] and [rad]."""
         simulator, row = self._simulator, self._row
-        time = int(simulator.steps_made[row]) * simulator.scenario.dt
-        self.renderer.add(simulator.true_q[row].copy(), position_error, orientation_error, time)
+        time, q = int(simulator.steps_made[row]) * simulator.scenario.dt, simulator.true_q[row].copy()
+        self.renderer.add(q, position_error, orientation_error, time, simulator.obstacles(row))
         if self._human:
             self.renderer.draw()
 

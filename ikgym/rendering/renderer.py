@@ -14,6 +14,7 @@ from matplotlib.backends.registry import backend_registry
 from matplotlib.figure import Figure
 
 from ikgym.arms import Arm
+from ikgym.kernels.bodies import Surroundings
 from ikgym.rendering.scene import Scene
 from ikgym.validation import FloatArray
 
@@ -33,11 +34,22 @@ class Renderer:
         title: Title of the picture.
         has_orientation: Whether there is an orientation error to show.
         width: Of the picture in [px], a multiple of 4; it is half as high, and all in it grows with it.
+        surroundings: The obstacles as they are at the start; None if neither they nor bodies are shown.
     """
 
-    def __init__(self, arm: Arm, mode: str, *, title: str, has_orientation: bool, width: int = WIDTH) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        mode: str,
+        *,
+        title: str,
+        has_orientation: bool,
+        width: int = WIDTH,
+        surroundings: Surroundings | None = None,
+    ) -> None:
         self._arm, self._human, self._dpi = arm, mode == "human", DPI * width / WIDTH
-        self._title, self._has_orientation = title, has_orientation
+        self._title, self._has_orientation, self._surroundings = title, has_orientation, surroundings
+        self._boxes: FloatArray | None = None
         self._scene: Scene | None = None
         self._in_window = False
         self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in the episode's own
@@ -66,7 +78,14 @@ class Renderer:
         self._states = self._tools = 0  # number of known rows
         self._staged = False  # whether the scene is set for this episode
 
-    def add(self, q: FloatArray, position_error: float, orientation_error: float, time: float) -> None:
+    def add(
+        self,
+        q: FloatArray,
+        position_error: float,
+        orientation_error: float,
+        time: float,
+        boxes: FloatArray | None = None,
+    ) -> None:
         """Records a state without drawing; at most steps + 1 states an episode.
 
         Args:
@@ -74,8 +93,9 @@ class Renderer:
             position_error: In [m].
             orientation_error: In [rad]; ignored where the task has no orientation.
             time: Since the start of the episode, in [s].
+            boxes: The obstacles as they are now; None for those at the start. Shape (o, 16).
         """
-        k = self._states
+        k, self._boxes = self._states, boxes
         self._q[k] = q
         self._errors[k] = position_error, orientation_error
         self._time[k] = time
@@ -94,7 +114,7 @@ class Renderer:
             return None
         if self._scene is None:
             figure = self._window() if self._human else _in_memory(self._dpi)
-            self._scene = Scene(figure, self._arm, self._title, self._has_orientation)
+            self._scene = Scene(figure, self._arm, self._title, self._has_orientation, self._surroundings)
             self._staged = False
         scene, k = self._scene, self._states
         new = min(self._tools, k - 1)
@@ -102,9 +122,11 @@ class Renderer:
         self._tools = k
         if anew := not self._staged:
             start = np.vstack([self._arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
-            scene.set_stage(self._nominal, start, margin=0.08 * self._arm.reach(self._q[0]), duration=self._duration)
+            margin = 0.08 * self._arm.reach(self._q[0])
+            scene.set_stage(self._nominal, start, margin, self._duration, self._boxes)
             self._staged = True
         scene.set_arm(self._arm.joint_points(self._q[k - 1]), rotations[-1], self._tool[:k], self._nominal)
+        scene.set_solids(self._q[k - 1], self._boxes)
         anew |= scene.set_errors(self._time[:k], self._errors[:k], len(self._time) - 1)
         scene.paint(anew=anew)
         if self._human:

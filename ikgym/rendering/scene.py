@@ -6,6 +6,7 @@ parts.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,9 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import MaxNLocator
 
 from ikgym.arms import Arm
+from ikgym.kernels.bodies import Surroundings
 from ikgym.rendering.error_curve import ErrorCurve
+from ikgym.rendering.solid_lines import SolidLines
 from ikgym.rendering.style import (
     BLUE,
     GREEN,
@@ -50,9 +53,12 @@ class Scene:
         arm: The arm that moves.
         title: Title of the picture.
         has_orientation: Whether there is an orientation error to show.
+        surroundings: The obstacles as they are at the start; None if neither they nor bodies are shown.
     """
 
-    def __init__(self, figure: Figure, arm: Arm, title: str, has_orientation: bool) -> None:
+    def __init__(
+        self, figure: Figure, arm: Arm, title: str, has_orientation: bool, surroundings: Surroundings | None = None
+    ) -> None:
         self.figure, self._title = figure, title
         self._prismatic = arm.chain.prismatic
         self._background: Any = None
@@ -80,6 +86,8 @@ class Scene:
         self._tool = self._line("tool", ls="", marker="D", ms=5.5, mfc=VERMILION, mec=INK, mew=0.8)
         self._target = self._line("target", ls="", marker="o", ms=11, mfc="none", mec=GREEN, mew=1.6)
         self._frame = [self._line(f"tool {name}", color=colour, lw=2.0) for name, colour in AXES.items()]
+        self._solids = None if surroundings is None else SolidLines(arm, surroundings, self._line)
+        self._clearance = math.inf
         self._has_orientation, self._frame_length = has_orientation, 0.0
         self._base.set_data_3d(np.zeros((3, 1)))
         self._curves = self._error_curves(has_orientation)
@@ -92,7 +100,9 @@ class Scene:
             # A canvas also draws by itself, when its window is resized or the view turned.
             figure.canvas.mpl_connect("draw_event", self._keep_background)
 
-    def set_stage(self, nominal: FloatArray, start: FloatArray, margin: float, duration: float) -> None:
+    def set_stage(
+        self, nominal: FloatArray, start: FloatArray, margin: float, duration: float, boxes: FloatArray | None = None
+    ) -> None:
         """Sets the parts that are fixed during an episode.
 
         Args:
@@ -100,14 +110,19 @@ class Scene:
             start: Points of the arm at the start in [m]. Shape (any, 3).
             margin: Space around base, nominal path and start, in [m].
             duration: Of the episode, in [s].
+            boxes: The obstacles; None for those at the start. Shape (o, 16).
         """
         self._nominal.set_data_3d(thinned(nominal, stride(len(nominal))).T)
         points = np.vstack([np.zeros(3), start, nominal])
+        if self._solids is not None:
+            points = np.vstack([points, self._solids.extent(boxes)])
         low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         self._frame_length = FRAME * float((high - low).max())
         # Nothing is readable in a flat box.
         sides = np.maximum(high - low, 0.6 * (high - low).max())
         low, high = 0.5 * (low + high - sides), 0.5 * (low + high + sides)
+        if self._solids is not None:
+            self._solids.look(low, high)
         self._space.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         self._space.set_box_aspect(tuple(sides), zoom=0.95)  # which scales an array in place
         # One distance of ticks for all axes; none near an end, where it would run into those of the next axis.
@@ -142,8 +157,18 @@ class Scene:
             for line, axis in zip(self._frame, rotation.T, strict=True):
                 line.set_data_3d(np.vstack([path[-1], path[-1] + self._frame_length * axis]).T)
 
+    def set_solids(self, q: FloatArray, boxes: FloatArray | None) -> None:
+        """Moves bodies and obstacles, if they are shown.
+
+        Args:
+            q: Joint coordinates in [rad] or [m]. Shape (n,).
+            boxes: The obstacles; None for those at the start. Shape (o, 16).
+        """
+        if self._solids is not None:
+            self._clearance = self._solids.show(q, boxes)
+
     def set_errors(self, time: FloatArray, errors: FloatArray, steps: int) -> bool:
-        """Moves the error curves on, and the time in the heading.
+        """Moves the error curves on, and the time and the clearance in the heading.
 
         Args:
             time: The times so far in [s]. Shape (k,).
@@ -153,7 +178,8 @@ class Scene:
         Returns:
             Whether an axis changed, so that all must be drawn anew.
         """
-        self._heading.set_text(f"{self._title},  t = {time[-1]:.3f} s")
+        clearance = f",  clearance {1e3 * self._clearance:.1f} mm" if math.isfinite(self._clearance) else ""
+        self._heading.set_text(f"{self._title},  t = {time[-1]:.3f} s{clearance}")
         changes = [curve.show(time, errors[:, i], steps) for i, curve in enumerate(self._curves)]
         return any(changes)
 
@@ -223,6 +249,11 @@ class Scene:
         labels = [handle.get_label() for handle in handles]
         if self._has_orientation:
             handles, labels = [*handles, tuple(self._frame)], [*labels, "tool x, y, z"]
+        if self._solids is not None:
+            handles, labels = (
+                [*handles, *self._solids.lines],
+                [*labels, *(one.get_label() for one in self._solids.lines)],
+            )
         self.figure.legend(
             handles,
             labels,

@@ -66,7 +66,7 @@ def test_both_kinematics_are_of_the_same_arm():
 
 
 def test_coal_measures_the_same_bodies():
-    arm, obstacles = bodies.panda(), bodies.ten_boxes()
+    arm, obstacles = ikgym.arms.get(bodies.ARM), bodies.ten_boxes()
     q = bodies.postures(arm, 20)
     measure, found = bodies.with_coal(arm, obstacles)
     for row, distance in zip(q, arm.clearance(q, obstacles)[0], strict=True):

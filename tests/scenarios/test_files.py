@@ -10,12 +10,15 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import ikgym
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
 from ikgym.arms import Arm, catalogue, from_urdf
+from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario, load
 from ikgym.scenarios.toml import document
@@ -40,6 +43,21 @@ OWN = Arm(
     lower=np.array([-1.0, -np.inf, -0.0]),
     upper=np.array([1.0, np.inf, 2.0]),
     velocity_limit=np.array([1.0, 2.0, np.inf]),
+    bodies=Bodies(
+        ("column", 'the "tool"', "upper"),
+        (0, 3, 2),
+        [[0, 0, 1 / 3], [0.1, 0, 0], [-0.0, 5e-324, 1e12]],
+        [[0, 0, 0.1], [0.1, 0, 0], [1, 2, 3]],
+        (1 / 3, 1e-300, 0.2),
+        (("upper", "column"),),
+    ),
+)
+MOTION = Helix([1 / 3, 0, 0], 0.1, 0.2, 3.0)
+OBSTACLES = (
+    Sphere("ball", [1 / 3, -0.0, 1e-300], 1 / 3, MOTION, ("upper", 'the "tool"')),
+    Capsule("bar", [0, 0, 1 / 3], [0.1, 0.2, 0.3], 0.1, Sinusoid(0.1 * np.ones(3)), ("upper",)),
+    Box("crate", [1, 2, 3], [1 / 3, 1e-12, 1], Rotation.random(rng=np.random.default_rng(2)).as_matrix()),
+    HalfSpace("größe", [0, 0, -9], [0, 1 / 3, 1], MOTION.replace(radius=1.0), ("upper",)),
 )
 #: A scenario in which nothing has its default.
 WHOLE = Scenario(
@@ -78,6 +96,8 @@ WHOLE = Scenario(
         pose_missing=0.1,
     ),
     source="a test",
+    obstacles=OBSTACLES,
+    collisions=False,
 )
 
 
@@ -88,7 +108,7 @@ def fields(part):
             type(part).__name__,
             {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
         ]
-    if isinstance(part, tuple) and part and isinstance(part[0], ikgym.Arm):
+    if isinstance(part, tuple) and part and dataclasses.is_dataclass(part[0]):
         return [fields(one) for one in part]
     return "None" if part is None else part
 
@@ -321,6 +341,13 @@ BAD = [
     ({"arm": "{urdf = 'a.urdf'}"}, r"\[arm\] Cannot read .*a\.urdf"),
     ({"arm": "{urdf = 3}"}, r"\[arm\] path: expected a text"),
     ({"model": "{urdf = 'a.urdf', tipp = 'c'}"}, "Did you mean 'tip'"),
+    ({"arm": "{like = 'varga7', bodies = {nmes = []}}"}, "Did you mean 'names'"),
+    ({"arm": "{like = 'varga7', bodies = {names = ['a'], links = [1]}}"}, r"\[arm.bodies\] starts of bodies"),
+    ({"obstacles": "[{kind = 'spere'}]"}, "Did you mean 'sphere'"),
+    ({"obstacles": "{kind = 'sphere'}"}, "obstacles: expected a list of tables"),
+    ({"obstacles": "[{kind = 'box', name = 'a', position = [0, 0, 0]}]"}, r"\[obstacles\] size: expected numbers"),
+    ({"obstacles": "[{kind = 'sphere', name = 'a', position = [0, 0, 0], radius = 1}]"}, "an arm with bodies"),
+    ({"collisions": "'yes'"}, "collisions: expected true or false"),
     ({"plant": "{arms = ['panda-22']}"}, "Did you mean 'panda-2'"),
     ({"plant": "{arms = 'panda-2'}"}, r"\[plant\] arms: expected a list of arms"),
     ({"plant": "{arms = [{name = 'a'}]}"}, r"\[plant.arms\] offsets: expected numbers"),

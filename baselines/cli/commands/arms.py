@@ -103,7 +103,25 @@ def _table(name: str, arm: Arm) -> str:
     tool = shell.numbers(arm.forward(np.zeros(arm.joints))[1])
     home = "none stated" if arm.home is None else f"({shell.numbers(arm.home)}) rad or m"
     title = f"{name}: {arm.joints} joints, tool at ({tool}) m where q = 0, home posture {home}"
-    return f"{textwrap.fill(title, shell.width())}\n\n{shell.aligned(rows, shell.width())}"
+    return "\n\n".join([textwrap.fill(title, shell.width()), shell.aligned(rows, shell.width()), *_bodies(arm)])
+
+
+def _bodies(arm: Arm) -> list[str]:
+    """The bodies of an arm, a line for each link that has some; nothing if there are none."""
+    bodies, links = arm.bodies, ("the base", *arm.joint_names)
+    if not len(bodies):
+        return []
+    lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
+    kinds = [f"capsule of {length:.3g} m" if length else "sphere" for length in lengths]
+    texts = [
+        f"{name} ({kind}, radius {r:.3g} m)" for name, kind, r in zip(bodies.names, kinds, bodies.radii, strict=True)
+    ]
+    rows = [
+        (links[link], ", ".join(text for text, own in zip(texts, bodies.links, strict=True) if own == link))
+        for link in sorted(set(bodies.links))
+    ]
+    table = shell.aligned([("moved by", f"bodies; {len(bodies.pairs)} pairs of them can meet"), *rows], shell.width())
+    return [table]
 
 
 def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> str:

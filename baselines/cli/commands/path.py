@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import tyro
@@ -16,15 +16,16 @@ from baselines.cli.parsing import parse
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.retiming import refusal, retimed
 from baselines.paths.speeds import Speeds, speed_limit
-from baselines.paths.survey import REACHED, follows
+from baselines.paths.survey import REACHED, Contact, follows
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Scenario
+from ikgym.files import read_user_toml
+from ikgym.scenarios import Scenario, files
 from ikgym.validation import BoolArray, FloatArray, whole_number
 
 PROGRAM = f"{shell.CONSOLE} path"
-#: Most branches in the table.
-SHOWN = 8
+#: Most branches in the table, and the number of the column of clearances.
+SHOWN, CLEARANCE = 8, 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,18 +37,24 @@ class Options(OwnPath):
     fastest: bool = False
     """Times the path as fast as the limits allow, not only as fast as asked."""
     branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Takes the start in this line of the table; collisions are known to you alone."""
+    """Takes the start in this line of the table."""
+    obstacles: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Obstacles of another scenario file, or of a file with nothing else, instead of those of the scenario."""
+    bodies: Literal["on", "off"] | None = None
+    """Whether bodies count. They do where there are obstacles, and with a CSV file if the arm has bodies."""
 
 
 def manual() -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Says whether an arm can drive a path, from which start and how fast: qp plays it from several postures at the first
-pose, and toppra finds the shortest time in which the limits hold. Needs pip install "ikgym[paths]".
+pose, and toppra finds the shortest time in which the limits hold. Where the arm has bodies, it keeps clear of itself
+and of obstacles. Needs pip install "ikgym[paths]".
 
 Examples:
   {PROGRAM} weld.toml --retime weld-retimed.toml
-  {PROGRAM} weld.csv --arm arm.urdf --tip tool0 --speed 0.2 --acceleration 5"""
+  {PROGRAM} weld.csv --arm arm.urdf --tip tool0 --speed 0.2 --acceleration 5
+  {PROGRAM} weld.csv --arm panda --speed 0.2 --obstacles cell.toml"""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -55,7 +62,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
-    every = found = survey(scenario_of(options))
+    every = found = survey(_scenario(options))
     if options.branch is not None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])
@@ -67,6 +74,19 @@ def main(arguments: Sequence[str]) -> int:
         driven.scenario.save(options.retime)
         print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
     return 0
+
+
+def _scenario(options: Options) -> Scenario:
+    """The scenario that the options mean, with its obstacles."""
+    scenario, changes = scenario_of(options), {}
+    if options.obstacles is not None:
+        table = read_user_toml(options.obstacles)
+        with files.located("", options.obstacles):
+            given = {"obstacles": table.get("obstacles", [])}
+            changes = files.arguments(Scenario, given, options.obstacles.parent, like=True)
+    if options.bodies is not None or options.file.endswith(".csv"):
+        changes["collisions"] = len(scenario.arm.bodies) > 0 if options.bodies is None else options.bodies == "on"
+    return scenario.replace(**changes) if changes else scenario
 
 
 def _head(found: Survey) -> list[str]:
@@ -93,9 +113,11 @@ def _tool(scenario: Scenario) -> list[str]:
 
 
 def _table(found: Survey) -> str:
-    head = ("", "reaches", "velocity", "acceleration", "to a stop", "shortest", "start [rad or m]")
-    rows = [_row(i, branch, found.scenario) for i, branch in enumerate(found.branches[:SHOWN], 1)]
-    return shell.aligned([head, *rows], shell.width())
+    head = ("", "reaches", "velocity", "acceleration", "to a stop", "clearance", "shortest", "start [rad or m]")
+    rows = [head, *(_row(i, branch, found.scenario) for i, branch in enumerate(found.branches[:SHOWN], 1))]
+    if all(branch.contact is None for branch in found.branches):
+        rows = [(*row[:CLEARANCE], *row[CLEARANCE + 1 :]) for row in rows]
+    return shell.aligned(rows, shell.width())
 
 
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
@@ -109,9 +131,18 @@ def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
         _share(arm, branch.velocity / scenario.largest_qdot) if branch.whole else "–",
         _share(arm, branch.acceleration / arm.acceleration_limit) if branch.whole else "–",
         f"{room:.2f} {_unit(arm, joint)} {arm.joint_names[joint]}" if np.isfinite(room) else "–",
+        _clearance(branch.contact),
         "–" if branch.shortest is None else f"{branch.shortest.duration:.3g} s",
         " ".join(f"{q + 0.0:.1f}" for q in np.round(branch.start, 1)),
     )
+
+
+def _clearance(contact: Contact | None) -> str:
+    if contact is None:
+        return "–"
+    pair = ", ".join(contact.pair)
+    touch = f"touch at {contact.time:.3g} s: {pair}"
+    return touch if contact.touched else f"{_small(contact.clearance, 'm')}: {pair}"
 
 
 def _small(value: float, unit: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,16 +32,33 @@ def _scenario(name: str) -> str:
 
 def _parts(scenario: Scenario) -> dict[str, object]:
     limit = np.unique(scenario.velocity_limit)
-    return {
-        "arm": f"{scenario.arm.name}: {', '.join(scenario.arm.joint_names)}",
-        "nominal model": scenario.model.name,
-        "task": scenario.task.name,
-        "trajectory": type(scenario.trajectory).__name__,
-        "random": "yes, by the seed" if scenario.random else "no",
-        "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
-        "accelerations": _accelerations(scenario.arm),
-        "cost": scenario.cost,
-    } | _path(scenario)
+    return (
+        {
+            "arm": f"{scenario.arm.name}: {', '.join(scenario.arm.joint_names)}",
+            "nominal model": scenario.model.name,
+            "task": scenario.task.name,
+            "trajectory": type(scenario.trajectory).__name__,
+            "random": "yes, by the seed" if scenario.random else "no",
+            "velocity limit": f"{', '.join(f'{x:g}' for x in limit)} rad/s or m/s",
+            "accelerations": _accelerations(scenario.arm),
+            "cost": scenario.cost,
+        }
+        | _bodies(scenario)
+        | _path(scenario)
+    )
+
+
+def _bodies(scenario: Scenario) -> dict[str, object]:
+    """The bodies of the arm, and the obstacles, a line for each kind; nothing where there are none."""
+    bodies, kinds = scenario.arm.bodies, dict[str, list[str]]()
+    for one in scenario.obstacles:
+        kind = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(one).__name__).lower()
+        kinds.setdefault(kind, []).append(f"{one.name} (moves)" if one.motion is not None else one.name)
+    if not len(bodies) and not kinds:
+        return {}
+    count = "an arm that touches something is stopped" if scenario.collides else "do not count"
+    own = {"bodies": f"{len(bodies)} on the arm, {len(bodies.pairs)} pairs of which can meet"} if len(bodies) else {}
+    return {**own, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count}
 
 
 def _accelerations(arm: Arm) -> str:

@@ -6,6 +6,7 @@ const ENTRIES = JSON.parse(document.getElementById("data").textContent);
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#a0622d", "#8a8f98"];
 const LIMITS = ["joint", "acceleration", "velocity", "stop"]; // colours of a joint by its limit
 const MOST_ARMS = 4; // browsers keep few WebGL contexts
+const [NEAR, BESIDE] = [0.8, 0.15]; // obstacles are shown within this share of the longest side of what moves, and others only beside it
 const NEAREST = 0.01; // smallest cost above the best known on its axis, in [%]
 const SMALLEST = 1e-10; // errors below are rounding, in [m] and [rad]
 const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
@@ -142,9 +143,13 @@ function drawPanels(id, panels, height) {
 
 function drawErrors() {
   const kinds = { position_error: "position error [m]", orientation_error: "orientation error [rad]" };
-  return drawPanels("errors", Object.entries(kinds).filter(([name]) => chosen().some((entry) => array(entry, name))).map(([name, title]) => ({
+  const panels = Object.entries(kinds).filter(([name]) => chosen().some((entry) => array(entry, name))).map(([name, title]) => ({
     title, log: true, values: (entry) => array(entry, name)?.map(([error]) => (error < SMALLEST ? SMALLEST : error)),
-  })), 240);
+  }));
+  const clearance = { title: "clearance [m]", limits: [0], values: (entry) => array(entry, "clearance") && column(array(entry, "clearance")) };
+  const collides = chosen().some(clearance.values);
+  element("errors-head").textContent = collides ? "Errors and clearance over time" : "Errors over time";
+  return drawPanels("errors", collides ? [...panels, clearance] : panels, 240);
 }
 
 function drawJoints() {
@@ -165,14 +170,42 @@ const PLAYER = { arms: [], time: 0, end: 0, playing: false, last: 0, busy: false
 const xyz = (points) => ({ x: points.map((p) => p[0]), y: points.map((p) => p[1]), z: points.map((p) => p[2]) });
 const rowAt = (entry, time) => Math.max(0, array(entry, "time").findLastIndex(([t]) => t <= time + 1e-9));
 
-// The traces of an arm that move: actual path, links, joints, axes of the tool, reference position.
+// The traces of an arm that move: actual path, links, joints, axes of the tool, reference position; bodies, obstacles, closest pair.
 function moving({ entry, length }, k) {
   const points = triples(array(entry, "points")[k]);
   const tool = points.at(-1);
   const turned = array(entry, "rotation")[k];
   const axes = [0, 1, 2].flatMap((j) => [tool, tool.map((x, i) => x + length * turned[3 * i + j]), gap]);
   const path = array(entry, "points").slice(0, k + 1).map((row) => row.slice(-3));
-  return [path, points, entry.series.joint_ends.map((end) => points[end]), axes, [array(entry, "nominal")[k]]].map(xyz);
+  const usual = [path, points, entry.series.joint_ends.map((end) => points[end]), axes, [array(entry, "nominal")[k]]].map(xyz);
+  if (!collides(entry)) return usual;
+  const solids = xyz(solidsAt(entry, k));
+  return [...usual, solids, solids, xyz(triples(array(entry, "closest")[k]))];
+}
+const collides = (entry) => array(entry, "surface") !== undefined;
+
+// The vertices of bodies and obstacles in space.
+function solidsAt(entry, k) {
+  const frames = array(entry, "frames")[k];
+  return array(entry, "surface").map(([x, y, z, carrier]) => [0, 1, 2].map((i) => {
+    const turned = 12 * carrier + 3 * i;
+    return frames[turned] * x + frames[turned + 1] * y + frames[turned + 2] * z + frames[12 * carrier + 9 + i];
+  }));
+}
+
+// Bodies and obstacles have the same vertices, and other triangles.
+function solidTraces(arm, scene) {
+  if (!collides(arm.entry)) return [];
+  const [bodies, obstacles, closest] = moving(arm, 0).slice(5);
+  const triangles = array(arm.entry, "triangles");
+  const count = arm.entry.series.of_bodies;
+  const look = { type: "mesh3d", hoverinfo: "skip", showlegend: false, scene, flatshading: true, lighting: { ambient: 0.75, diffuse: 0.5 }, visible: element("bodies").checked };
+  const mesh = (name, where, some, changes) => ({ ...look, name, ...where, i: column(some), j: column(some, 1), k: column(some, 2), ...changes });
+  return [
+    mesh("bodies", bodies, triangles.slice(0, count), { color: colour(arm.entry), opacity: 0.25 }),
+    mesh("obstacles", obstacles, triangles.slice(count), { color: themed("obstacle"), opacity: 0.45 }),
+    { ...look, ...closest, type: "scatter3d", mode: "lines", name: "closest pair", line: { color: themed("ink"), width: 4 } },
+  ];
 }
 const states = (entry, k) => array(entry, "limit")[k].map((state) => themed(LIMITS[state]));
 
@@ -187,13 +220,19 @@ function armTraces(arm, number) {
     dots("joints", joints, { color: states(arm.entry, 0), size: 7, line: { color: themed("ink"), width: 1 } }),
     line("tool frame", axes, { color: frame, width: 6 }),
     dots("reference position", target, { color: themed("reference"), size: 6, symbol: "circle-open", line: { width: 2 } }),
+    ...solidTraces(arm, `scene${number ? number + 1 : ""}`),
   ];
 }
 
-// Ranges that hold all paths and arms, the same in all scenes.
+// Ranges that hold all paths and arms, and obstacles as far as they are near these; the same in all scenes.
 function ranges(entries) {
   const values = entries.flatMap((entry) => [gap.map(() => 0), ...array(entry, "points").flatMap(triples), ...array(entry, "nominal")]);
-  const ends = [0, 1, 2].map((i) => values.reduce(([low, high], p) => (Number.isFinite(p[i]) ? [Math.min(low, p[i]), Math.max(high, p[i])] : [low, high]), [0, 0]));
+  const within = (points) => [0, 1, 2].map((i) => points.reduce(([low, high], p) => (Number.isFinite(p[i]) ? [Math.min(low, p[i]), Math.max(high, p[i])] : [low, high]), [0, 0]));
+  const arms = within(values);
+  const size = Math.max(...arms.map(([low, high]) => high - low));
+  const held = (p, share) => p.map((x, i) => Math.min(Math.max(x, arms[i][0] - share * size), arms[i][1] + share * size));
+  const solids = entries.filter(collides).flatMap((entry) => solidsAt(entry, 0));
+  const ends = within([...values, ...solids.map((p) => (held(p, NEAR).every((x, i) => x === p[i]) ? p : held(p, BESIDE)))]);
   const longest = Math.max(...ends.map(([low, high]) => high - low), 1e-3);
   return ends.map(([low, high]) => { // nothing can be seen in a flat box
     const half = Math.max(high - low, 0.6 * longest) / 2 + 0.05 * longest;
@@ -206,10 +245,12 @@ async function drawReplay() {
   const box = entries.length ? ranges(entries) : [];
   const length = Math.max(0, ...box.map(([low, high]) => 0.1 * (high - low)));
   PLAYER.arms = entries.map((entry) => ({ entry, length }));
+  PLAYER.arms.reduce((first, arm) => { arm.first = first; return first + (collides(arm.entry) ? 9 : 6); }, 0);
   PLAYER.end = Math.max(0, ...entries.map((entry) => array(entry, "time").at(-1)[0]));
   PLAYER.time = Math.min(PLAYER.time, PLAYER.end);
   element("time").max = PLAYER.end;
   element("play").disabled = !entries.length;
+  for (const part of document.querySelectorAll(".contacts")) part.hidden = !entries.some(collides);
   const columns = element("replay").clientWidth > 720 ? Math.min(entries.length, 2) : 1;
   const rows = Math.ceil(entries.length / Math.max(columns, 1));
   const side = (k, name) => ({ range: box[k], title: { text: `${name} [m]` }, nticks: 5, gridcolor: themed("line"), backgroundcolor: themed("card"), color: themed("quiet"), showspikes: false });
@@ -236,8 +277,9 @@ function words({ entry }, k, number) {
   const { x, y } = element("replay")._fullLayout[`scene${number ? number + 1 : ""}`].domain;
   const one = (name, unit) => (array(entry, name) ? `${shown(1e3 * array(entry, name)[k][0])} ${unit}` : "");
   const errors = [one("position_error", "mm"), one("orientation_error", "mrad")].filter(Boolean).join(", ");
+  const clearance = collides(entry) ? `, clearance ${one("clearance", "mm")}` : "";
   return {
-    text: `<b>${label(entry)}</b><br>error ${errors}`, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom", align: "left",
+    text: `<b>${label(entry)}</b><br>error ${errors}${clearance}`, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom", align: "left",
     showarrow: false, bordercolor: colour(entry), borderpad: 3,
   };
 }
@@ -253,7 +295,7 @@ async function seek(time) {
   const annotations = PLAYER.arms.map((arm, number) => {
     const k = rowAt(arm.entry, PLAYER.time);
     moving(arm, k).forEach((points, trace) => {
-      places.push(6 * number + trace + 1);
+      places.push(arm.first + trace + 1);
       for (const name of "xyz") update[name].push(points[name]);
       update["marker.color"].push(trace === 2 ? states(arm.entry, k) : trace === 4 ? themed("reference") : undefined);
     });
@@ -304,6 +346,7 @@ async function begin() {
   element("play").addEventListener("click", () => setPlaying(!PLAYER.playing));
   element("time").addEventListener("input", ({ target }) => seek(Number(target.value)));
   element("quantity").addEventListener("change", drawJoints);
+  element("bodies").addEventListener("change", drawReplay);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
   document.documentElement.dataset.ready = "yes";
 }

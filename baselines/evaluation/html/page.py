@@ -44,6 +44,7 @@ COLUMNS = (
         )
     ),
     *report.PATH,
+    *report.CONTACTS,
     *report.TIMES,
     report.EPISODES,
     report.LOST,

@@ -11,10 +11,13 @@ import numpy.typing as npt
 
 from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
+from ikgym.solids import bounded, in_space, surface
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
 BUDGET, FEWEST = 5_000_000, 50
+#: Stretches of a quarter of a circle in surfaces, and half the edge of a half-space as a multiple of the arm's size.
+STRETCHES, PLATE = 3, 2.0
 #: Limits of a joint, from the least to the most severe; the page has a colour for each number.
 FREE, ACCELERATION, VELOCITY, STOP = range(4)
 
@@ -31,10 +34,13 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
         to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
         the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
         how many steps there were (``rows``), the limits, ``joint_names``, which joints are prismatic, and which points
-        are ends of joints (``joint_ends``). A log without frames has no data for a replay.
+        are ends of joints (``joint_ends``). A log without frames has no data for a replay. Where the scenario has
+        collisions, the smallest ``clearance``, the ``closest`` points, the ``frames`` that carry bodies and obstacles,
+        and the surfaces of these, see :func:`_surfaces`.
     """
     frames = log.get("frame", frame_rows(len(log["time"]), FRAMES))
-    picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1])))
+    carriers = log["carrier_frames"].shape[1] if "carrier_frames" in log else 0
+    picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1], carriers)))
     rows = frames[picked]
     starts = np.concatenate([[0], rows[:-1] + 1])
     arrays: dict[str, npt.NDArray[Any]] = {name: log[name][rows] for name in ("time", "q")}
@@ -51,6 +57,12 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
     if "joint_points" in log:
         arrays["points"], out["joint_ends"] = _links(log, picked)
         arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
+    if carriers:
+        arrays["clearance"] = np.fmin.reduceat(log["clearance"], starts)
+        arrays["closest"] = log["closest"][picked].reshape(-1, 6)
+        arrays["frames"] = log["carrier_frames"][picked].reshape(-1, 12 * carriers)
+        surfaces, out["of_bodies"] = _surfaces(log)
+        arrays |= surfaces
     out |= {name: _listed(log[name]) for name in BOUNDS if name in log}
     return out | {"arrays": {name: encoded(values) for name, values in arrays.items()}}
 
@@ -71,9 +83,26 @@ def encoded(values: npt.NDArray[Any]) -> dict[str, Any]:
     return {"type": kind, "shape": list(kept.shape), "data": base64.b64encode(kept.tobytes()).decode("ascii")}
 
 
-def _row_size(joints: int) -> int:
+def _surfaces(log: TrajectoryLog) -> tuple[dict[str, npt.NDArray[Any]], int]:
+    """The surfaces of bodies and obstacles, and how many of their triangles are those of bodies.
+
+    The ``surface`` has vertices in the frames that carry them in [m], each with the number of its frame (v, 4); the
+    ``triangles`` have three of them each (t, 3).
+    """
+    solids, of_bodies = bounded(log["solids"], PLATE * float(np.abs(log["joint_points"]).max())), 0
+    vertices, triangles, known = [], [], 0
+    for solid, carrier in zip(solids, log["carriers"].tolist(), strict=True):
+        points, faces = surface(solid[12:], STRETCHES)
+        vertices.append(np.column_stack([in_space(solid, points), np.full(len(points), carrier)]))
+        triangles.append(faces + known)
+        known += len(points)
+        of_bodies += len(faces) * (carrier <= log["q"].shape[1])
+    return {"surface": np.vstack(vertices), "triangles": np.vstack(triangles)}, of_bodies
+
+
+def _row_size(joints: int, carriers: int) -> int:
     """Bytes of a row as text, at most: base64 takes four for three."""
-    numbers = 2 * joints + 3 * (2 * joints + 2) + joints + 9 + 6
+    numbers = 2 * joints + 3 * (2 * joints + 2) + joints + 9 + 6 + (7 + 12 * carriers if carriers else 0)
     return (4 * numbers + joints) * 4 // 3
 
 

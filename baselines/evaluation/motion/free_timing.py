@@ -71,7 +71,7 @@ def first_steps(episode: Episode, steps: int) -> Episode:
     """The beginning of an episode."""
     if len(episode.q) == steps:
         return episode
-    arrays = {name: values[:steps] for name, values in vars(episode).items() if name != "diagnostics"}
+    arrays = {name: values[:steps] for name, values in vars(episode).items() if isinstance(values, np.ndarray)}
     diagnostics = {name: values[:steps] for name, values in episode.diagnostics.items()}
     return dataclasses.replace(episode, **arrays, diagnostics=diagnostics)
 

@@ -1,4 +1,4 @@
-"""Errors over time, and the position with that of the reference: all policies of a scenario in one picture."""
+"""Errors, clearance and position over time: all policies of a scenario in one picture."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ MOST = len(style.COLOURS)
 # Errors below are rounding, which would flatten the other curves.
 SMALLEST = 1e-10  # [m] and [rad]
 ERRORS = {"position_error": "position error [m]", "orientation_error": "orientation error [rad]"}
+# Where bodies touch is shown if they come so near, in [m].
+TOUCHED = 0.02
 HEIGHT = 1.75  # of a panel, in [in]
 
 
@@ -34,12 +36,15 @@ def draw(title: str, logs: Sequence[tuple[str, Series]]) -> Figure:
     """
     first = logs[0][1]
     kinds = [kind for kind in ERRORS if kind in first]
-    drawn = style.figure(0.7 + HEIGHT * (len(kinds) + 1))
-    grid = drawn.add_gridspec(len(kinds) + 1, 3)
+    rows = len(kinds) + ("clearance" in first) + 1
+    drawn = style.figure(0.7 + HEIGHT * rows)
+    grid = drawn.add_gridspec(rows, 3)
     for row, kind in enumerate(kinds):
         axes = drawn.add_subplot(grid[row, :])
         _draw_errors(axes, [(name, log[kind]) for name, log in logs], first["time"])
         style.dress(axes, ylabel=ERRORS[kind])
+    if "clearance" in first:
+        _draw_clearance(drawn.add_subplot(grid[len(kinds), :]), logs)
     lines: list[Any] = []
     for place, letter in enumerate("xyz"):
         lines = _draw_position(drawn.add_subplot(grid[-1, place]), f"{letter} [m]", place - 3, logs)
@@ -73,6 +78,16 @@ def _draw_errors(axes: Axes, errors: Sequence[tuple[str, FloatArray]], time: Flo
     axes.set_xmargin(0.01)
     if below := [name for name, error in errors if np.median(error) < lowest]:
         axes.set_title(f"below the axis: {', '.join(below)}", loc="right", fontsize=style.SMALL, color=style.STEEL)
+
+
+def _draw_clearance(axes: Axes, logs: Sequence[tuple[str, Series]]) -> None:
+    """The clearance of all policies, and where bodies touch."""
+    for number, (_, log) in reversed(list(enumerate(logs))):
+        axes.plot(log["time"], log["clearance"], lw=_width(number, len(logs)), **style.looks(number))
+    if min(float(log["clearance"].min()) for _, log in logs) < TOUCHED:
+        axes.axhline(0.0, color=style.STEEL, lw=0.8, ls=style.DASHES[2])
+    style.dress(axes, ylabel="clearance [m]")
+    axes.set_xmargin(0.01)
 
 
 def _width(number: int, of: int) -> float:

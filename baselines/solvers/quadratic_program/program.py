@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from baselines.solvers.linear_algebra import transposed_product
-from baselines.solvers.quadratic_program.velocity_box import braking_speed
+from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.kernels.tasks import AXIS, POSE
 
@@ -183,14 +184,59 @@ def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, 
 @inner
 def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
     """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
+    bound = False
+    for j in range(qdot.shape[0]):
+        bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
+    return bound and left_over(jacobian, shift, weight, preferred, qdot)
+
+
+@inner
+def left_over(jacobian, shift, weight, preferred, qdot):
+    """Whether the task error that is left weighs more than the joint motion."""
     e, n = jacobian.shape
-    bound, left, motion = False, 0.0, 0.0
+    left, motion = 0.0, 0.0
     for a in range(e):
         missing = shift[a]
         for j in range(n):
             missing -= jacobian[a, j] * qdot[j]
         left += missing * missing
     for j in range(n):
-        bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
         motion += weight * (qdot[j] - preferred[j]) ** 2
-    return bound and left > motion
+    return left > motion
+
+
+@inner
+def row_program(model, numbers, q, last, jacobian, motion, error, preferred, program):
+    """The program of one arm: its bounds, H and g; the task shift takes the place of the motion of the reference.
+
+    Args:
+        model: The :class:`Model`.
+        numbers: The parameters, those of :class:`QuadraticProgramNumbers` at least.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
+        jacobian: J, which becomes J Δt with the weight of the rotation. Shape (e, n).
+        motion: Motion of the reference, which becomes the task shift Δx. Shape (e,).
+        error: The present error, which becomes the share of it that is taken back. Shape (e,).
+        preferred: Preferred joint velocities. Shape (n,).
+        program: Receives H, g, lower and upper bounds.
+
+    Returns:
+        Weight of the joint motion.
+    """
+    hessian, linear, lower, upper = program
+    velocity_box(numbers.limits, model.dt, q, last, lower, upper)
+    if numbers.rotation_weight != 1.0:
+        weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
+    jacobian *= model.dt
+    error *= numbers.gain
+    weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, numbers.limits[FASTEST])
+    weight *= SCALING_WEIGHT if numbers.scaling else 1.0
+    curvature(jacobian, weight, hessian)
+    if numbers.braking_share > 0.0:
+        error *= feedback_share(hessian, jacobian, error, numbers.braking_share * numbers.limits[CHANGE])
+    motion += error
+    if numbers.scaling:
+        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, hessian, linear)
+    else:
+        goal(jacobian, motion, weight, preferred, linear)
+    return weight

@@ -8,24 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from baselines.policy.parameters import parameter
+from baselines.solvers.near_bodies import around
+from baselines.solvers.quadratic_program.among_bodies import AmongBodiesNumbers, qp_step_among
 from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.program import (
-    SCALING_WEIGHT,
-    curvature,
-    feedback_share,
-    goal,
-    goal_to_scale,
-    held_back,
-    motion_weight,
-    weigh_rotation,
-)
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
+from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
-from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.validation import flag
+from ikgym.validation import flag, number
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -34,31 +26,16 @@ LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 def qp_step(model, numbers, seen, memory, answer):
     """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
-    gain, damping, lm_damping, braking_share, rotation_weight, scaling, pull, limits = numbers
-    (q, last), dt = (seen.q, seen.qdot), model.dt
-    qdot, status, iterations = answer
-    n, size = q.shape[1], q.shape[1] + scaling
+    q, pull, (qdot, status, iterations) = seen.q, numbers.pull, answer
+    n, size = q.shape[1], q.shape[1] + numbers.scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     preferred, x = np.empty(n), np.empty(size)
     for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row], last[row], lower, upper)
         for j in range(n):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
-        jac, shift, missing = jacobian[row], motion[row], error[row]
-        if rotation_weight != 1.0:
-            weigh_rotation(model.kind, rotation_weight, jac, shift, missing)
-        jac *= dt
-        missing *= gain
-        weight = motion_weight(jac, missing, damping, lm_damping, limits[FASTEST])
-        weight *= SCALING_WEIGHT if scaling else 1.0
-        curvature(jac, weight, hessian)
-        if braking_share > 0.0:
-            missing *= feedback_share(hessian, jac, missing, braking_share * limits[CHANGE])
-        shift += missing
-        if scaling:
-            upper[n] = goal_to_scale(jac, shift, weight, preferred, hessian, linear)
-        else:
-            goal(jac, shift, weight, preferred, linear)
+        jac, shift = jacobian[row], motion[row]
+        parts = hessian, linear, lower, upper
+        weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
         iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
         for j in range(n):
             qdot[row, j] = x[j]
@@ -93,21 +70,49 @@ class QuadraticProgram(VelocityProgram):
     Khatib 2015 and in Pink. The status is ``saturated`` where a joint stands at a bound and the task error that is left
     weighs more than the motion.
 
+    Where bodies matter, each pair of them nearer than d* = `influence` has a row ∇dᵀ q̇ >= −v: a velocity damper
+    (Faverjon and Tournassoud 1987). v is the speed from which the pair can still come to rest at `clearance`, with half
+    of the acceleration limits, and at most a quarter of the way to it in one step. Obstacles are where they will be
+    after the step. The program is solved by a dual active set, exactly (:func:`row_minimum`). Where no joint velocity
+    within the limits has all rows, all v are raised by the same amount, the smallest that will do: the limits of the
+    joints are physical, and hold. z also leads away from what is near (:func:`repel`). Only velocities of the next
+    step are weighed, so that the arm may run into a dead end.
+
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
         damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight: See :class:`VelocityProgram`.
         task_scaling: Whether to keep the direction of the task velocity.
+        clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
+        influence: Distance d* from which on they are slowed down, in [m]. Above `clearance`.
+        repulsion: K of the joint motion away from what is near, in [1/s], at least 0 and below 2/Δt.
 
     Raises:
         InvalidInputError: A number is out of its range.
     """
 
     task_scaling: bool = parameter(False, flag)
+    clearance: float = parameter(0.005, number, at_least=0.0)
+    influence: float = parameter(0.3, number, above=0.0)
+    repulsion: float = parameter(10.0, number, at_least=0.0)
 
     name: ClassVar[str] = "qp"
-    step = qp_step
+    step, step_among = qp_step, qp_step_among
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.among_bodies:
+            self.check_secondary_gain(self.repulsion, "repulsion")
+        if self.influence <= self.clearance:
+            raise InvalidInputError(
+                f"influence: expected a number above the clearance of {self.clearance:g} m, got {self.influence:g}."
+            )
 
     def numbers(self) -> QuadraticProgramNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         return self.program_numbers(scaling=self.task_scaling)
+
+    def numbers_among(self) -> AmongBodiesNumbers:
+        """See :meth:`CompiledPolicy.numbers_among`."""
+        program = self.program_numbers(scaling=self.task_scaling)
+        return AmongBodiesNumbers(*program, self.clearance, self.influence, self.repulsion, *around(self.problem))

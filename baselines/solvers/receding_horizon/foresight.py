@@ -67,8 +67,8 @@ class RecedingHorizonForesight(RecedingHorizon):
 
     @property
     def interior_point(self) -> bool:
-        """Whether plans are made by the interior point method: for arms with limits of any kind."""
-        return self.problem.model.limited
+        """Whether plans are made by the interior point method: for arms with limits of any kind, or with bodies."""
+        return self.problem.model.limited or super().interior_point
 
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""

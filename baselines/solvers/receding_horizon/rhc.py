@@ -20,9 +20,16 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
+from baselines.solvers.near_bodies import around
+from baselines.solvers.receding_horizon.newton.bodies import swept
 from baselines.solvers.receding_horizon.newton.grid import offsets
-from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step
-from baselines.solvers.receding_horizon.newton.settings import PlanNumbers, PlanSettings, plain_settings
+from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
+from baselines.solvers.receding_horizon.newton.settings import (
+    PlanNumbers,
+    PlanNumbersAmong,
+    PlanSettings,
+    plain_settings,
+)
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
 from ikgym.validation import FloatArray, flag, number, whole_number
@@ -53,6 +60,10 @@ class RecedingHorizon(CompiledPolicy):
     convergence to the optimum, with a number of iterations with a barrier parameter that stays, and without limits
     nothing changes.
 
+    Where bodies may not touch, the clearance of each near pair at each knot is a limit like the others, see
+    :mod:`newton.clearance`. Obstacles that move are held still over the horizon, where they will be after the coming
+    step. The first step of a plan is checked between its ends, too: one in which something would touch is slowed down.
+
     Args:
         problem: The scenario as the policy knows it.
         horizon: HL, the number of grid points with the present one. At least 2; HL - 1 steps must be shown ahead.
@@ -82,6 +93,7 @@ class RecedingHorizon(CompiledPolicy):
             in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
             score has no such term: smooth velocities have their price. 0 for none.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
+        clearance: The distance in [m] that bodies keep at the knots of a plan, where they may not touch.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
@@ -99,9 +111,10 @@ class RecedingHorizon(CompiledPolicy):
     recovery_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
     rate_weight: float = parameter(0.0, number, at_least=0.0)
     tolerance: float = parameter(1e-7, number, above=0.0)
+    clearance: float = parameter(1e-3, number, at_least=0.0)
 
     name: ClassVar[str] = "rhc"
-    step = plan_step
+    step, step_among = plan_step, plan_step_among
     grain: ClassVar[int] = 1
 
     #: Steps from now to the knots. Shape (K,).
@@ -140,8 +153,8 @@ class RecedingHorizon(CompiledPolicy):
 
     @property
     def interior_point(self) -> bool:
-        """Whether plans are made by the interior point method: where accelerations are limited."""
-        return bool(np.isfinite(self.problem.model.acceleration_limit).any())
+        """Whether plans are made by the interior point method: with limits of acceleration or among bodies."""
+        return bool(np.isfinite(self.problem.model.acceleration_limit).any()) or self.among_bodies
 
     @property
     def preview(self) -> int:
@@ -161,6 +174,10 @@ class RecedingHorizon(CompiledPolicy):
     def numbers(self) -> PlanNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         return self._numbers
+
+    def numbers_among(self) -> PlanNumbersAmong:
+        """See :meth:`CompiledPolicy.numbers_among`."""
+        return PlanNumbersAmong(*self._numbers, self.clearance, swept(self.problem.model), *around(self.problem))
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.

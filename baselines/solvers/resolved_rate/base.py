@@ -54,7 +54,7 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
 
     gain: float = parameter(1.0, number, above=0.0, below=2.0)
 
-    def check_secondary_gain(self, gain: float) -> None:
+    def check_secondary_gain(self, gain: float, name: str = "secondary_gain") -> None:
         """Checks the gain of a secondary objective in [1/s] against the time step.
 
         Raises:
@@ -62,7 +62,7 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
         """
         if gain * self.problem.dt >= 2.0:
             limit = 2.0 / self.problem.dt
-            raise InvalidInputError(f"secondary_gain: expected a number below 2/Δt = {limit:g}, got {gain:g}.")
+            raise InvalidInputError(f"{name}: expected a number below 2/Δt = {limit:g}, got {gain:g}.")
 
     def memory(self, rows: int) -> Memory:
         """A :class:`NominalMemory` without a step before."""

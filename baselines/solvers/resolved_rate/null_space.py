@@ -10,6 +10,7 @@ import numpy as np
 
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
+from baselines.solvers.near_bodies import ROWS, around, bodies_of, near_distances, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
@@ -55,6 +56,47 @@ class NullSpaceNumbers(NamedTuple):
     goal: FloatArray
 
 
+class AmongBodiesNumbers(NamedTuple):
+    """The parameters of :class:`NullSpace` among bodies as its kernel takes them.
+
+    Attributes:
+        gain, tolerance, full_rank, damping, secondary_gain, joint_gain, goal: See :class:`NullSpaceNumbers`.
+        influence: The distance from which on a pair is looked at, in [m].
+        repulsion: K of the way out, in [1/s].
+        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
+    """
+
+    gain: float
+    tolerance: float
+    full_rank: int
+    damping: float
+    secondary_gain: float
+    joint_gain: FloatArray
+    goal: FloatArray
+    influence: float
+    repulsion: float
+    bodies: FloatArray
+    boxes: FloatArray
+
+
+@kernel
+def null_space_step_among(model, numbers, seen, memory, answer):
+    """One step of :class:`NullSpace` among bodies; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    add_feedback(numbers.gain, error, shift)
+    q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
+    aim, distances, gradients = np.empty(q.shape), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
+    objective_rows(numbers, q, aim)
+    aim *= numbers.secondary_gain
+    for row in range(q.shape[0]):
+        around_it = shapes, checked, boxes[row % boxes.shape[0]]
+        count = near_distances(model.chain, *around_it, q[row], numbers.influence, distances, gradients)
+        repel(distances, gradients, count, numbers.influence, model.dt * numbers.repulsion, aim[row])
+    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
+    finish(model, answer)
+
+
 @kernel
 def null_space_step(model, numbers, seen, memory, answer):
     """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
@@ -76,17 +118,24 @@ def move_rows(numbers, q, jacobian, shift, out, status):
         out: Receives the joint shifts. Shape (B, n).
         status: Receives values of :class:`Status`. Shape (B,).
     """
-    tolerance, full_rank = numbers.tolerance, numbers.full_rank
-    aim, disturbance, deficient = np.empty(q.shape), np.empty(shift.shape), np.empty(q.shape[0], np.bool_)
+    aim = np.empty(q.shape)
     objective_rows(numbers, q, aim)
     aim *= numbers.secondary_gain
+    aimed_rows(numbers, aim, jacobian, shift, out, status)
+
+
+@kernel
+def aimed_rows(numbers, aim, jacobian, shift, out, status):
+    """The same, for secondary joint shifts Δt z of shape (B, n)."""
+    tolerance, full_rank = numbers.tolerance, numbers.full_rank
+    disturbance, deficient = np.empty(shift.shape), np.empty(aim.shape[0], np.bool_)
     task_rows(jacobian, aim, disturbance)
     if numbers.damping == 0.0:  # with one pseudoinverse
         pseudoinverse_rows(jacobian, shift - disturbance, tolerance, full_rank, out, deficient)
         out += aim
         say_deficient(deficient, status)
         return
-    taken_off = np.empty(q.shape)
+    taken_off = np.empty(aim.shape)
     damped_rows(jacobian, shift, numbers.damping, out)
     pseudoinverse_rows(jacobian, disturbance, tolerance, full_rank, taken_off, deficient)
     out += aim - taken_off
@@ -120,6 +169,10 @@ class NullSpace(MoorePenrose):
       and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the gain of the joint with
       the smallest range. Joints without two finite limits are left alone.
 
+    Where bodies matter, z also leads away from what is near, see :func:`repel`: an artificial potential (Khatib 1986)
+    in the null space, as in Maciejewski and Klein 1985. Nothing keeps such an arm from touching something, least of all
+    with its tool.
+
     The first part is Moore–Penrose, or damped least squares if there is a damping. J⁺ in the second part is never
     damped, or the task would be disturbed. An arm without redundancy is moved by the secondary objective in singular
     poses only, where the Jacobian has a null space.
@@ -133,6 +186,8 @@ class NullSpace(MoorePenrose):
         secondary_gain: K in [1/s], at least 0 and below 2/Δt.
         posture: q_posture in [rad] or [m], 0 if left out; one number, or one a joint. For ``posture`` only.
         damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
+        influence: Distance from which on bodies are led away, in [m]. Above 0.
+        repulsion: K of that in [1/s], at least 0 and below 2/Δt.
 
     Raises:
         InvalidInputError: A number is out of its range, or the joints are to be centred and none of them has
@@ -144,11 +199,13 @@ class NullSpace(MoorePenrose):
     secondary_gain: float = parameter(1.0, number, at_least=0.0)
     posture: float | Sequence[float] | None = None
     damping: float = parameter(1e-3, number, at_least=0.0)
+    influence: float = parameter(0.3, number, above=0.0)
+    repulsion: float = parameter(10.0, number, at_least=0.0)
     _target: FloatArray = dataclasses.field(init=False, repr=False)
     _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "null_space"
-    step = null_space_step
+    step, step_among = null_space_step, null_space_step_among
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -159,6 +216,8 @@ class NullSpace(MoorePenrose):
         posture = per_joint("posture", given, model.joints)
         target, gains = _centre(model) if objective == "joint_centring" else (posture, np.ones(model.joints))
         self.check_secondary_gain(self.secondary_gain)
+        if self.among_bodies:
+            self.check_secondary_gain(self.repulsion, "repulsion")
         self._settle(objective=objective, posture=as_given(given, posture))
         self._settle(_target=read_only(target), _joint_gain=read_only(gains))
 
@@ -173,6 +232,10 @@ class NullSpace(MoorePenrose):
             self._joint_gain,
             self._target,
         )
+
+    def numbers_among(self) -> AmongBodiesNumbers:
+        """See :meth:`CompiledPolicy.numbers_among`."""
+        return AmongBodiesNumbers(*self.numbers(), self.influence, self.repulsion, *around(self.problem))
 
 
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:

@@ -8,19 +8,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from baselines.solvers.receding_horizon.newton.clearance import add_clearance, clearance_value
 from baselines.solvers.receding_horizon.newton.cost import add_rate_cost, rate_cost, tracking_errors
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.terms import (
+    Bounded,
     derivatives_without_kink,
     kink_steepness,
-    primal_dual_curvature,
+    one_side,
     smoothed,
-    trusted,
     velocity_cost,
     velocity_derivatives,
     without_kink,
 )
-from baselines.solvers.receding_horizon.newton.workspace import BEYOND, CURVATURE, GRADIENT, MULTIPLIER, joints_at
+from baselines.solvers.receding_horizon.newton.workspace import joints_at
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
@@ -39,20 +40,6 @@ class Barrier(NamedTuple):
 
     mu: float
     limit_weight: float
-
-
-class Bounded(NamedTuple):
-    """A quantity between two bounds.
-
-    Attributes:
-        value: φ of both bounds.
-        gradient: Its derivative.
-        curvature: Its second derivative, as Newton's method is to take it.
-    """
-
-    value: float
-    gradient: float
-    curvature: float
 
 
 @uncounted
@@ -86,7 +73,7 @@ def merit(problem, path, barrier, workspace):
             total += _value(path[k, j] + way, lower[j], upper[j], dt * limit, weight, mu)
     if problem.rate_weight > 0.0:
         total += rate_cost(problem, path)
-    return total
+    return total + clearance_value(problem.clearance, problem, path, barrier, workspace)
 
 
 @uncounted
@@ -111,6 +98,7 @@ def linearise(problem, path, barrier, advance, exact, workspace):
     model.diagonal[:knots] = 0.0
     if problem.rate_weight > 0.0:
         total += add_rate_cost(problem, path, model)
+    total += add_clearance(problem.clearance, problem, path, barrier, advance, workspace)
     total += _add_tracking(problem, path, barrier, advance, exact, workspace)
     return total + _add_motion(problem, path, barrier, advance, workspace)
 
@@ -238,31 +226,11 @@ def bounded(barriers, k, i, x, low, high, scale, weight, mu, advance):
     """The ``i``-th quantity of knot ``k`` between its bounds; gives a :class:`Bounded`, and brings its λ up to date."""
     value = gradient = curvature = 0.0
     if high < math.inf:
-        here = _one_side(barriers, k, i, 0, (x - high) / scale, weight, mu, advance)
+        here = one_side(barriers, k, i, 0, (x - high) / scale, weight, mu, advance)
         value, gradient, curvature = here.value, here.gradient / scale, here.curvature / (scale * scale)
     if low > -math.inf:
-        here = _one_side(barriers, k, i, 1, (low - x) / scale, weight, mu, advance)
+        here = one_side(barriers, k, i, 1, (low - x) / scale, weight, mu, advance)
         value += here.value
         gradient -= here.gradient / scale
         curvature += here.curvature / (scale * scale)
     return Bounded(value, gradient, curvature)
-
-
-@inlined
-def _one_side(barriers, k, i, side, u, weight, mu, advance):
-    """One bound; gives a :class:`Bounded`. λ goes on by what the primal-dual equations have said of this step."""
-    here = smoothed(u, weight, mu)
-    multiplier = here.gradient
-    if advance >= 0.0:
-        multiplier = barriers[k, i, side, MULTIPLIER]
-        if advance > 0.0:
-            told = barriers[k, i, side, GRADIENT] - multiplier
-            moved = u - barriers[k, i, side, BEYOND]
-            multiplier += advance * told + barriers[k, i, side, CURVATURE] * moved
-        multiplier = trusted(multiplier, here, weight)
-    curvature = primal_dual_curvature(here, weight, multiplier)
-    barriers[k, i, side, MULTIPLIER] = multiplier
-    barriers[k, i, side, GRADIENT] = here.gradient
-    barriers[k, i, side, CURVATURE] = curvature
-    barriers[k, i, side, BEYOND] = u
-    return Bounded(here.value, here.gradient, curvature)

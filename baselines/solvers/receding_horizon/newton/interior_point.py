@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, KEPT, Barrier, change_steps, linearise, merit
+from baselines.solvers.receding_horizon.newton.clearance import clearance_excess, clearance_left
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import (
     CONVERGED,
@@ -25,7 +26,7 @@ from baselines.solvers.receding_horizon.newton.minimise import (
     next_damping,
     scalar_product,
 )
-from baselines.solvers.receding_horizon.newton.workspace import BARRIER_SIZE, BEYOND
+from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE, BEYOND
 from ikgym.kernels.jit import uncounted
 
 # μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less. Where the
@@ -65,7 +66,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
     unit = 1.0 / (problem.data.dt * problem.data.cost.delta_qdot) ** 2
     cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
     share, growth = max(cost / knots, LEAST_UNIT), 1.0
-    left = excess(problem, path, workspace.before)
+    left = excess(problem, path, workspace)
     mu = (smoothing if smoothing > 0.0 else min(max(FIRST_MU, EXCESS_MU * left), LARGEST_MU)) * share
     barrier, smooth = Barrier(mu, LIMIT_WEIGHT * share), smoothing > 0.0
     value = linearise(problem, path, barrier, ANEW, settings.exact, workspace)
@@ -81,7 +82,9 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
         if -0.5 * derivative <= max(enough, ROUNDING * abs(value)):
             cost = max(true_cost(problem, path, workspace), NEGLIGIBLE)
             last = mu if smooth else max(tolerance / bounds, LEAST_MU) * cost
-            left = limits_left(workspace, knots, max(LEFT, BY_MU * mu / barrier.limit_weight))
+            slack = max(LEFT, BY_MU * mu / barrier.limit_weight)
+            left = limits_left(workspace, knots, slack)
+            left = left or clearance_left(problem.clearance, workspace.clearance, knots, slack)
             if left and (smooth or growth >= LARGEST_GROWTH):
                 outcome = STALLED
                 break
@@ -144,14 +147,15 @@ def _line_search(problem, path, barrier, value, derivative, step, trial, workspa
 
 
 @uncounted
-def excess(problem, path, before):
+def excess(problem, path, workspace):
     """By how much a path leaves its limits, at most: a share of them, and of positions in units of the largest step.
 
-    Not above 0 where all limits are kept. Braking behind the last knot is not looked at. ``before`` is scratch.
+    Not above 0 where all limits are kept. Braking behind the last knot is not looked at.
     """
     data, lengths, start = problem.data, problem.grid.length, problem.start
     limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
-    limited, dt, most = changes.shape[0] > 0, data.dt, -np.inf
+    limited, dt, before = changes.shape[0] > 0, data.dt, workspace.before
+    most = clearance_excess(problem.clearance, problem, path, workspace)
     for k in range(path.shape[0]):
         rate, span = 1.0 / (lengths[k] * dt), change_steps(lengths, k)
         for j in range(path.shape[1]):
@@ -168,6 +172,6 @@ def excess(problem, path, before):
 @uncounted
 def cost_within(problem, path, slack, workspace):
     """The cost of a path; infinite where accelerations are limited and the path leaves a limit by more than a share."""
-    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace.before) > slack:
+    if problem.change_limit.shape[0] > 0 and excess(problem, path, workspace) > slack:
         return np.inf
     return true_cost(problem, path, workspace)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.receding_horizon.newton.clearance import wait_clear
 from baselines.solvers.receding_horizon.newton.grid import Grid, empty_grid, shift_multipliers, shift_path
 from baselines.solvers.receding_horizon.newton.guess import DAMPING, STREAM, draw, initial_guess, slow_down, uniform
 from baselines.solvers.receding_horizon.newton.interior_point import cost_within, minimise_path
@@ -63,10 +64,10 @@ class PlanWorkspace(NamedTuple):
 
 
 @inner
-def plan_workspace(kind, m, knots, n, width, limited):
+def plan_workspace(kind, m, knots, n, width, limited, clearance):
     """The workspace for plans of ``knots`` knots and ``width`` multipliers a knot; see :func:`newton_workspace`."""
     kept = plan_in(np.empty(knots * (n + width)), knots, n)
-    newton, vectors = newton_workspace(kind, m, knots, n, limited), np.empty((2, n))
+    newton, vectors = newton_workspace(kind, m, knots, n, limited, clearance), np.empty((2, n))
     return PlanWorkspace(newton, kept, vectors[0], vectors[1], empty_grid(knots), empty_grid(knots))
 
 
@@ -134,6 +135,7 @@ def _guess(problem, settings, first, damping, path, workspace):
     initial_guess(problem, first, workspace.drift, damping, path, workspace.newton.knot)
     if settings.recovery_steps > 0:
         slow_down(problem, path)
+    wait_clear(problem.clearance, problem, first, path, workspace.newton)
 
 
 @inner

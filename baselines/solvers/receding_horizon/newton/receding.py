@@ -8,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.solvers.near_bodies import bodies_of
 from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
+from baselines.solvers.receding_horizon.newton.clearance import keep_clear
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_path
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
@@ -65,24 +68,45 @@ def plan_step(model, numbers, seen, memory, answer):
 
     The iterations are the Newton steps made, those of initial guesses and candidates among them.
     """
+    plan_rows(model, numbers, seen, memory, answer, None)
+
+
+@kernel
+def plan_step_among(model, numbers, seen, memory, answer):
+    """The same among bodies, with the obstacles held still over the horizon where they will be after the step."""
+    shapes, checked = bodies_of(numbers.bodies)
+    influence = numbers.clearance + INFLUENCE
+    clearance = Clearance(shapes, numbers.boxes, checked, numbers.sweep, numbers.clearance, influence)
+    plan_rows(model, numbers, seen, memory, answer, clearance)
+
+
+@expanded
+def plan_rows(model, numbers, seen, memory, answer, clearance):
+    """:func:`plan_step` with a :class:`bodies.Clearance`, whose boxes are those of each row or of all, or with None."""
     chain, kind = model.chain, model.kind
     # Read-only, as others have compiled for.
     chain = Chain(chain.offsets, chain.axes, numbers.prismatic, chain.tool, chain.tool_rotation)
     cost, settings = settings_of(numbers.numbers, numbers.integers)
     data = ProblemData(chain, kind, cost, model.dt, model.lower, model.upper, model.largest)
     knots, n, plans = settings.at.shape[0], model.unit.shape[0], memory.plans
-    workspace = plan_workspace(
-        kind, seen.nominal.shape[2], knots, n, plans.shape[2] // knots - n, settings.change_limit.shape[0] > 0
-    )
-    plan_batch(data, settings, seen, memory, answer, workspace)
+    limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n
+    workspace = plan_workspace(kind, seen.nominal.shape[2], knots, n, width, limited, clearance)
+    plan_batch(data, settings, seen, memory, answer, clearance, workspace)
 
 
 @uncounted
-def plan_batch(data, settings, observations, memory, answers, workspace):
+def plan_batch(data, settings, observations, memory, answers, clearance, workspace):
     """Plans one period for each of B arms; the settings are :class:`PlanSettings`, other arguments as above."""
     plans, counts = memory
+    around = clearance
     for row in range(observations.q.shape[0]):
         q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
+        if clearance is not None:  # the obstacles of this row
+            first = row % clearance.boxes.shape[0]
+            boxes = clearance.boxes[first : first + 1]
+            around = Clearance(
+                clearance.shapes, boxes, clearance.checked, clearance.sweep, clearance.margin, clearance.influence
+            )
         grid, old_grid = _grids(settings, observations.remaining[row], workspace)
         # Where the horizon ends with the episode nothing comes behind it.
         braking = not settings.stop_at_end or observations.remaining[row] > settings.at[-1]
@@ -96,12 +120,14 @@ def plan_batch(data, settings, observations, memory, answers, workspace):
             settings.change_limit,
             braking,
             workspace.newton.errors[:0],  # policies know of no payload
+            around,
         )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
         kept = _first_velocity(problem, plans[row, 0], answers.qdot[row])
+        kept = keep_clear(around, problem, answers.qdot[row], workspace.newton.clearance) and kept
         count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
         answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
         answers.iterations[row] = made

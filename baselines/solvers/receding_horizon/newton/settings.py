@@ -51,6 +51,26 @@ class PlanNumbers(NamedTuple):
     integers: Integers
 
 
+class PlanNumbersAmong(NamedTuple):
+    """The parameters as the kernel of a step among bodies takes them.
+
+    Attributes:
+        prismatic, numbers, integers: See :class:`PlanNumbers`.
+        clearance: The distance that is kept at the knots, in [m].
+        sweep: See :class:`bodies.Clearance`. Shape (k, n).
+        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
+    """
+
+    prismatic: npt.NDArray[np.bool_]
+    numbers: Floats
+    integers: Integers
+    clearance: float
+    sweep: Floats
+    bodies: Floats
+    boxes: Floats
+
+
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
     """The numbers and the whole numbers of cost and settings, each as one read-only block, for :func:`settings_of`.
 

@@ -37,6 +37,11 @@ LEAST_SPEED = 1e-3
 TRUSTED = 1e4
 
 
+# What is kept of a barrier: λ; and φ', what was taken for φ'', and u at the path before.
+MULTIPLIER, GRADIENT, CURVATURE, BEYOND = range(4)
+BARRIER_SIZE = 4
+
+
 class AugmentedTerm(NamedTuple):
     """An augmented-Lagrangian term at one place.
 
@@ -230,3 +235,37 @@ def trusted(multiplier, here, weight):
     low = max(here.gradient / TRUSTED, weight - TRUSTED * rest)
     high = min(TRUSTED * here.gradient, weight - rest / TRUSTED)
     return min(max(multiplier, low), high)
+
+
+class Bounded(NamedTuple):
+    """A quantity between two bounds.
+
+    Attributes:
+        value: φ of both bounds.
+        gradient: Its derivative.
+        curvature: Its second derivative, as Newton's method is to take it.
+    """
+
+    value: float
+    gradient: float
+    curvature: float
+
+
+@inlined
+def one_side(barriers, k, i, side, u, weight, mu, advance):
+    """One bound; gives a :class:`Bounded`. λ goes on by what the primal-dual equations have said of this step."""
+    here = smoothed(u, weight, mu)
+    multiplier = here.gradient
+    if advance >= 0.0:
+        multiplier = barriers[k, i, side, MULTIPLIER]
+        if advance > 0.0:
+            told = barriers[k, i, side, GRADIENT] - multiplier
+            moved = u - barriers[k, i, side, BEYOND]
+            multiplier += advance * told + barriers[k, i, side, CURVATURE] * moved
+        multiplier = trusted(multiplier, here, weight)
+    curvature = primal_dual_curvature(here, weight, multiplier)
+    barriers[k, i, side, MULTIPLIER] = multiplier
+    barriers[k, i, side, GRADIENT] = here.gradient
+    barriers[k, i, side, CURVATURE] = curvature
+    barriers[k, i, side, BEYOND] = u
+    return Bounded(here.value, here.gradient, curvature)

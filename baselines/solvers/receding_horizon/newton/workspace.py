@@ -8,15 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.solvers.receding_horizon.newton.bodies import Clearance, ClearanceWorkspace, clearance_workspace
 from baselines.solvers.receding_horizon.newton.grid import Grid
+from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import expanded, inner
 
 Floats = npt.NDArray[np.float64]
-
-# What is kept of a barrier: λ; and φ', what was taken for φ'', and u at the path before.
-MULTIPLIER, GRADIENT, CURVATURE, BEYOND = range(4)
-BARRIER_SIZE = 4
 
 # Of problems in which changes of velocity cost nothing.
 NO_VELOCITY: Floats = np.zeros(0)
@@ -41,6 +39,7 @@ class PathProblem(NamedTuple):
             accelerations have a limit.
         load: Offset of the joint zeros by a payload at each knot, in [rad] or [m]. Shape (K, n), or (0, n)
             where there is none.
+        clearance: Bodies that must not touch, for the interior point method; None where they may.
     """
 
     data: ProblemData
@@ -52,6 +51,7 @@ class PathProblem(NamedTuple):
     change_limit: Floats = NO_VELOCITY
     braking: bool = False
     load: Floats = NO_LOAD
+    clearance: Clearance | None = None
 
 
 class KnotWorkspace(NamedTuple):
@@ -127,6 +127,7 @@ class NewtonWorkspace(NamedTuple):
         barriers: Where accelerations are limited, the barriers (see :mod:`interior_point`) of the knots' errors, then
             of their velocities, changes of velocity and positions, at the upper and at the lower bound.
             Shape (K or 0, e + 3 n, 2, 4).
+        clearance: Arrays for bodies that must not touch; None where they may.
     """
 
     knot: KnotWorkspace
@@ -138,6 +139,7 @@ class NewtonWorkspace(NamedTuple):
     trial: Floats
     before: Floats
     barriers: Floats
+    clearance: ClearanceWorkspace | None
 
 
 @expanded
@@ -184,7 +186,7 @@ def knot_workspace(kind, m, n):
 
 
 @inner
-def newton_workspace(kind, m, knots, n, limited=False):
+def newton_workspace(kind, m, knots, n, limited=False, clearance=None):
     """The workspace for paths of up to ``knots`` knots, task coordinates of ``m`` numbers and ``n`` joints.
 
     Args:
@@ -193,6 +195,7 @@ def newton_workspace(kind, m, knots, n, limited=False):
         knots: K.
         n: Joints.
         limited: Whether accelerations are limited.
+        clearance: Bodies that must not touch; None where they may.
     """
     e = task_kernels.error_size(kind, m)
     vectors, blocks, squares = np.empty((5, knots, n)), np.empty((4, knots, n, n)), np.empty((2, n, n))
@@ -206,4 +209,5 @@ def newton_workspace(kind, m, knots, n, limited=False):
         vectors[4],
         np.empty(n),
         np.zeros((knots if limited else 0, e + 3 * n, 2, BARRIER_SIZE)),
+        clearance_workspace(clearance, knots, n),
     )

@@ -1,0 +1,169 @@
+"""The quadratic program among bodies: what comes near is slowed down, so that it can brake before it touches."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, repel
+from baselines.solvers.quadratic_program.program import held_back, left_over, row_program
+from baselines.solvers.quadratic_program.row_minimum import row_minimum
+from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
+from baselines.solvers.resolved_rate.base import APPLIED, task_motion
+from baselines.status import Status
+from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.linear_algebra import cholesky
+from ikgym.validation import FloatArray
+
+LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
+# Share of the way to the clearance that a step may take, what is enough for joint motions that leave the task alone, in
+# [1/s], and from which share of a gradient on they are the way out.
+APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
+# Share of what is missing to the clearance that a step takes back, and share of the acceleration limits that braking
+# reckons with: the joints have a task besides.
+RETREAT, BRAKES = 0.1, 0.5
+# A row that is met so closely holds the arm back, in [m/s].
+MET = 1e-9
+
+
+class AmongBodiesNumbers(NamedTuple):
+    """The parameters of the quadratic program among bodies as its kernel takes them.
+
+    Attributes:
+        gain, damping, lm_damping, braking_share, rotation_weight, scaling, pull, limits: See
+            :class:`QuadraticProgramNumbers`.
+        clearance: The distance that is kept, in [m].
+        influence: The distance from which on a pair is looked at, in [m].
+        repulsion: How strongly the joints are led away from what is near, in [1/s].
+        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
+    """
+
+    gain: float
+    damping: float
+    lm_damping: float
+    braking_share: float
+    rotation_weight: float
+    scaling: bool
+    pull: FloatArray
+    limits: FloatArray
+    clearance: float
+    influence: float
+    repulsion: float
+    bodies: FloatArray
+    boxes: FloatArray
+
+
+@inlined
+def largest_approach(distance, clearance, dt, change, share):
+    """The largest speed at which a pair may come nearer, in [m/s]; below 0 where it is nearer than it should be.
+
+    A velocity damper (Faverjon and Tournassoud 1987): the speed is a share of the way that is left. It is also one
+    from which the pair comes to rest within that way, see :func:`braking_speed`.
+
+    Args:
+        distance: In [m].
+        clearance: The distance that is kept, in [m].
+        dt: Δt in [s].
+        change: Largest change of the speed in one step, in [m/s].
+        share: Of the way, in one step.
+    """
+    room = (distance - clearance) / dt
+    return min(share * room, braking_speed(room, change)) if room >= 0.0 else RETREAT * room
+
+
+@inner
+def aside(factor, weight, gradient):
+    """The share of a gradient's square that lies in joint motions which leave the task alone: w ∇dᵀ H⁻¹ ∇d / ‖∇d‖².
+
+    Args:
+        factor: L of H = (J Δt)ᵀ J Δt + w I = L Lᵀ. Shape (n, n).
+        weight: w.
+        gradient: ∇d, not 0. Shape (n,).
+    """
+    n, square, total = gradient.shape[0], 0.0, 0.0
+    solved = np.empty(n)
+    for i in range(n):
+        solved[i] = gradient[i]
+        for k in range(i):
+            solved[i] -= factor[i, k] * solved[k]
+        solved[i] /= factor[i, i]
+        square += gradient[i] * gradient[i]
+        total += solved[i] * solved[i]
+    return weight * total / square
+
+
+@inner
+def clearance_bounds(numbers, dt, hessian, weight, distances, gradients, count, bounds):
+    """Least rates of distances, in [m/s]: ∇dᵀ q̇ is at least minus :func:`largest_approach`.
+
+    What the joints can do aside from the task begins early and gently, since they have little acceleration for it. What
+    the task itself does, such as to lead the tool to a table, is slowed down as late as braking allows.
+
+    Args:
+        numbers: The :class:`AmongBodiesNumbers`.
+        dt: Δt in [s].
+        hessian: H of the program, in its upper left corner.
+        weight: Weight of the joint motion in it.
+        distances: Signed distances in [m]. Shape (ROWS,).
+        gradients: Their gradients. Shape (ROWS, n).
+        count: How many there are.
+        bounds: Receives the rates; -inf where no joint changes the distance. Shape (ROWS,).
+    """
+    n, braking = gradients.shape[1], numbers.limits[BRAKING]
+    factor = hessian[:n, :n].copy()
+    usable = count > 0 and cholesky(factor)
+    for i in range(count):
+        change = 0.0
+        for j in range(n):
+            if gradients[i, j] != 0.0:
+                change += BRAKES * abs(gradients[i, j]) * braking[j]
+        bounds[i] = -np.inf
+        if change > 0.0:
+            part = aside(factor, weight, gradients[i]) / ASIDE if usable else 0.0
+            share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
+            bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
+
+
+@kernel
+def qp_step_among(model, numbers, seen, memory, answer):
+    """One step of :class:`QuadraticProgram` among bodies; see :class:`CompiledPolicy` for the arguments."""
+    jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
+    q, pull, (qdot, status, iterations) = seen.q, numbers.pull, answer
+    n, size = q.shape[1], q.shape[1] + numbers.scaling
+    hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
+    preferred, x, rows, bounds = np.empty(n), np.empty(size), np.zeros((ROWS, size)), np.empty(ROWS)
+    distances, (shapes, checked) = np.empty(ROWS), bodies_of(numbers.bodies)
+    for row in range(q.shape[0]):
+        boxes, gradients = numbers.boxes[row % numbers.boxes.shape[0]], rows[:, :n]
+        args = shapes, checked, boxes, q[row], numbers.influence
+        count = near_distances(model.chain, *args, distances, gradients)
+        for j in range(n):
+            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
+        repel(distances, gradients, count, numbers.influence, numbers.repulsion, preferred)
+        jac, shift = jacobian[row], motion[row]
+        parts = hessian, linear, lower, upper
+        weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
+        clearance_bounds(numbers, model.dt, hessian, weight, distances, gradients, count, bounds)
+        iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
+        for j in range(n):
+            qdot[row, j] = x[j]
+        status[row] = APPLIED if found else LIMIT
+        held = held_back(jac, shift, weight, preferred, qdot[row], lower, upper)
+        if _met(rows, bounds, count, x) and not held:
+            held = left_over(jac, shift, weight, preferred, qdot[row])
+        if found and held:
+            status[row] = SATURATED
+
+
+@inner
+def _met(rows, bounds, count, x):
+    """Whether a row is met just so."""
+    met = False
+    for i in range(count):
+        rate = 0.0
+        for j in range(x.shape[0]):
+            rate += rows[i, j] * x[j]
+        met = met or rate <= bounds[i] + MET
+    return met

@@ -1,0 +1,64 @@
+"""Best known costs among bodies: certified clear by the plant, and of another episode than those without bodies."""
+
+import numpy as np
+import pytest
+
+import ikgym
+from baselines.fingerprints import episode_hash, fingerprint
+from baselines.oracle import Search, best_known, solve
+from baselines.oracle.episode import EpisodeProblem
+from baselines.oracle.search import polish
+from ikgym.obstacles import Sphere
+
+SEED, STEPS = 1, 150
+QUICK = Search(starts=6, generations=1, chains=2, rounds=2, polished=2, knots=20)
+FREE = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
+
+
+@pytest.fixture(scope="module")
+def free():
+    return solve(FREE, SEED, QUICK, cached=False)
+
+
+@pytest.fixture(scope="module")
+def ball(free):
+    """A ball that the cheapest path goes some millimetres into."""
+    elbow = FREE.arm.joint_points(free.q[-1])[3, 0]
+    for shift in np.linspace(0.2, 0.0, 81):
+        ball = Sphere("ball", elbow + np.array([0.0, shift, shift]), 0.05)
+        if FREE.arm.clearance(free.q, [ball])[0].min() < -2e-3:
+            return ball
+    raise AssertionError
+
+
+def test_the_best_path_is_clear_and_costs_more(free, ball):
+    scenario = FREE.replace(obstacles=[ball])
+    best = solve(scenario, SEED, QUICK, cached=False)
+    assert FREE.arm.clearance(best.q, [ball])[0].min() > 5e-5
+    assert free.cost < best.cost < 1.5 * free.cost
+    q, cost = EpisodeProblem.of(scenario, SEED).play(best.qdot)
+    assert cost == best.cost
+    np.testing.assert_array_equal(q, best.q)
+
+
+def test_a_path_that_touches_costs_without_end(free, ball):
+    scenario = FREE.replace(obstacles=[ball])
+    assert EpisodeProblem.of(scenario, SEED).play(free.qdot)[1] == np.inf
+    found = polish(scenario, SEED, {"free": free.q})
+    assert found.cost > free.cost
+    assert FREE.arm.clearance(found.q, [ball])[0].min() > 0.0
+
+
+def test_records_among_bodies_are_their_own(ball):
+    scenario = FREE.replace(obstacles=[ball])
+    moved = FREE.replace(obstacles=[ball.replace(radius=0.051)])
+    blind = scenario.replace(collisions=False)
+    assert len({fingerprint(one) for one in (FREE, scenario, moved)}) == 3
+    assert fingerprint(blind) == fingerprint(FREE)
+    other = scenario.replace(arm=FREE.arm.replace(bodies=FREE.arm.bodies.replace(radii=1.01 * FREE.arm.bodies.radii)))
+    assert episode_hash(other, SEED) != episode_hash(scenario, SEED)
+    assert episode_hash(other.replace(obstacles=[]), SEED) == episode_hash(FREE, SEED)
+
+
+def test_scenarios_without_bodies_keep_their_records():
+    assert best_known.lookup(ikgym.scenarios.get("panda-circle"), 0) is not None

@@ -1,0 +1,86 @@
+"""Receding horizons among bodies: nothing touches, and what is observed of obstacles counts."""
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.episodes import rollouts
+from ikgym.obstacles import Sphere
+from ikgym.random_boxes import RandomBoxes
+from ikgym.trajectories import Sampled
+
+STEPS = 300
+
+
+def total(episode):
+    return float(np.sum(episode.tracking_cost + episode.velocity_cost))
+
+
+def between(q):
+    """A path with nine configurations between each two."""
+    shares = np.linspace(0.0, 1.0, 11)[1:, None]
+    return np.concatenate([before + shares * (after - before) for before, after in zip(q, q[1:], strict=False)])
+
+
+def elbow_obstacle():
+    """A motion of the Panda, and a ball in the way of its elbow that the null space keeps clear of."""
+    scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
+    (free,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (1,))
+    elbow = scenario.arm.joint_points(free.q[-1])[3, 0]
+    for shift in np.linspace(0.2, 0.0, 81):
+        ball = Sphere("ball", elbow + np.array([0.0, shift, shift]), 0.05)
+        if scenario.arm.clearance(free.q, [ball])[0].min() < -2e-3:
+            break
+    assert scenario.arm.clearance(free.q[0], [ball])[0] > 2e-3
+    return scenario, ball, total(free)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("rhc_foresight", {}), ("rhc", {"horizon": 100, "move_blocks": 12, "iterations": 2})],
+)
+def test_a_ball_in_the_way_is_not_touched(name, parameters):
+    scenario, ball, free = elbow_obstacle()
+    clear = scenario.replace(obstacles=[ball])
+    (episode,) = rollouts(clear, baselines.make(name, clear, **parameters), (1,))
+    assert abs(episode.qdot[-1]).max() > 0.0  # not stopped
+    assert scenario.arm.clearance(between(episode.q), [ball])[0].min() > 5e-4
+    assert not episode.at_limit.any()
+    if name == "rhc_foresight":
+        assert total(episode) > free
+
+
+def test_drawn_boxes_are_kept_clear_of():
+    """Episode 10 of 1,000 steps, in which what looks at no bodies goes 14 mm into one."""
+    boxes = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.05] * 3, [0.25] * 3, 10, 0.02, 0.1)
+    scenario = ikgym.scenarios.get("panda-random").replace(steps=1000, obstacles=[boxes])
+    free = scenario.replace(obstacles=[])
+    (touching,) = rollouts(free, baselines.make("rhc_foresight", free), (10,))
+    (clear,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (10,))
+    drawn = scenario.obstacles_of(10)
+    assert scenario.arm.clearance(touching.q, drawn)[0].min() < -5e-3
+    assert scenario.arm.clearance(between(clear.q), drawn)[0].min() > 5e-4
+    assert total(clear) < 1.05 * total(touching)
+
+
+def test_obstacles_are_those_of_the_observation():
+    """Rows of a batch with other obstacles plan otherwise, and each as alone."""
+    scenario, ball, _ = elbow_obstacle()
+    frames = np.tile(np.append(np.eye(3).ravel(), ball.position), (2, 1))
+    frames[1, 9:] += [0.0, 1e-3, 0.0]
+    moving = Sphere("ball", [0.0, 0.0, 0.0], ball.radius, motion=Sampled([0.0, 1.0], frames))
+    shown = scenario.replace(obstacles=[moving])
+    policy = baselines.make("rhc", shown, horizon=200, move_blocks=12, iterations=5)
+    env = ikgym.RedundantIKEnv(shown, preview=policy.preview)
+    observation, _ = env.reset(seed=1)
+    assert observation["obstacles"].shape == (1, 16)
+    near, far = dict(observation), dict(observation)
+    tool = scenario.arm.forward(observation["q"])[1]
+    near["obstacles"], far["obstacles"] = observation["obstacles"].copy(), observation["obstacles"].copy()
+    near["obstacles"][0, 9:12] = scenario.arm.joint_points(observation["q"])[3, 0] + [0.0, 0.0, 0.14]
+    far["obstacles"][0, 9:12] = tool + [0.0, 0.0, 10.0]
+    alone = [policy.predict(one)[0] for one in (near, far)]
+    assert abs(alone[0] - alone[1]).max() > 1e-4
+    both = {name: np.stack([near[name], far[name]]) for name in near}
+    np.testing.assert_array_equal(policy.predict(both)[0], np.stack(alone))
