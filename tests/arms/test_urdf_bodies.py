@@ -138,7 +138,7 @@ def test_the_capsule_around_a_mesh_contains_its_corners_and_is_small():
     assert found.volume < 1.02 * exact
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply"])
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "dae"])
 @pytest.mark.parametrize("name", ["package://some_robot/meshes/link", "meshes/link"])
 def test_meshes_are_opened_where_they_are_asked_for(tmp_path, kind, name, caplog):
     folder = tmp_path / "some_robot"
@@ -188,13 +188,15 @@ def test_pairs_that_always_touch_are_ignored_and_named(write, caplog):
         ("<cone/>", "expected one of 'sphere', 'cylinder', 'capsule', 'box', 'mesh' in <geometry>, got 'cone'"),
         ("", "in <geometry>, got none"),
         ('<mesh filename="package://no/such.stl"/>', "expected the mesh 'package://no/such.stl'"),
-        ('<mesh filename="arm.urdf"/>', "expected a mesh of kind .stl, .obj, .ply, got 'arm.urdf'"),
+        ('<mesh filename="arm.urdf"/>', "expected a mesh of kind .stl, .obj, .ply, .dae, got 'arm.urdf'"),
+        ('<mesh filename="bomb.dae"/>', "expected XML without a DOCTYPE in 'bomb.dae'"),
         ('<mesh filename="broken.stl"/>', "link 'b': expected a mesh"),
     ],
 )
 def test_bad_geometry_is_refused(write, geometry, message):
     path = write(robot({"a": "", "b": shape(geometry)}, [joint("j", "a", "b")]))
     path.with_name("broken.stl").write_bytes(b"no mesh")
+    path.with_name("bomb.dae").write_bytes(b'<!DOCTYPE lolz [<!ENTITY lol "lol">]><COLLADA/>')
     with pytest.raises(InvalidInputError) as caught:
         from_urdf(path, meshes=True)
     assert message in str(caught.value)

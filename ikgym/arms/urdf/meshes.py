@@ -12,7 +12,7 @@ from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
 from ikgym.validation import LARGEST, FloatArray
 
-KINDS = (".stl", ".obj", ".ply")
+KINDS = (".stl", ".obj", ".ply", ".dae")
 # Collision meshes take some hundred kilobytes.
 MAX_BYTES = 64 * 2**20
 # A package is a folder at most so far above the URDF file.
@@ -41,9 +41,11 @@ def corners(where: str, name: str, folder: Path) -> tuple[FloatArray, float]:
     path = _found(where, name, folder)
     if path.suffix.lower() not in KINDS:
         raise InvalidInputError(f"{where}: expected a mesh of kind {', '.join(KINDS)}, got {name!r}.")
-    content = io.BytesIO(read_user_file(path, MAX_BYTES))
+    content = read_user_file(path, MAX_BYTES)
+    if path.suffix.lower() == ".dae" and (not content.lstrip().startswith(b"<") or b"<!DOCTYPE" in content):
+        raise InvalidInputError(f"{where}: expected XML without a DOCTYPE in {name!r}.")
     try:
-        mesh = trimesh.load_mesh(content, file_type=path.suffix[1:].lower(), process=False)
+        mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False)
         points, volume = np.array(mesh.vertices, dtype=float), float(mesh.convex_hull.volume)
     except Exception as error:  # whatever trimesh raises, it is about this file
         raise InvalidInputError(f"{where}: expected a mesh in {name!r}, got the error: {error}") from error

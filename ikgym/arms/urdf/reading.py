@@ -70,7 +70,7 @@ def from_urdf(
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
             is left out. Shape (3, 3).
-        meshes: Whether collision meshes are opened: STL, OBJ and PLY, by a path from the file or by the name of a
+        meshes: Whether collision meshes are opened: STL, OBJ, PLY and DAE, by a path from the file or by the name of a
             package, a folder of that name above the file. Closed ones are no bodies.
 
     Returns:
