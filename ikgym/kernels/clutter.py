@@ -16,6 +16,8 @@ Floats = npt.NDArray[np.float64]
 
 #: A box is drawn at most so many times.
 TRIES = 1000
+# Steps that are looked at first.
+FIRST = 33
 # Random numbers that a box takes: edges, angle, step, body, place along it, direction and distance from there.
 NUMBERS = 10
 
@@ -48,8 +50,8 @@ def draw_boxes(chain, shapes, checked, bends, drawing, paths, keys, out, found):
         chain: The arm, a :class:`ikgym.kernels.kinematics.Chain`.
         shapes: Its bodies, :class:`ikgym.kernels.bodies.Shapes`.
         checked: Whether a body may not touch a box. Shape (b,).
-        bends: Bounds of the second derivatives of points of each body by two joints, in [m] per square of a unit of joint
-            coordinate. Shape (b,).
+        bends: Bounds of the second derivatives of points of each body by two joint coordinates, in [m] per unit of
+            both. Shape (b,).
         drawing: What is drawn.
         paths: Joint coordinates at the steps in [rad] or [m]; straight on in between. Shape (k, t, n).
         keys: Of the random numbers. Shape (k,).
@@ -67,10 +69,13 @@ def draw_boxes(chain, shapes, checked, bends, drawing, paths, keys, out, found):
         for box in range(out.shape[1]):
             key = stream(keys[row], box)
             for attempt in range(TRIES):
-                if not _draw(drawing, shapes, checked, placed, key, attempt * NUMBERS, out[row, box]):
+                step = _draw(drawing, shapes, checked, placed, key, attempt * NUMBERS, out[row, box])
+                if step < 0:
                     continue
-                nearest = _nearest(shapes, checked, placed, travelled, out[row, box], core, drawing.margin)
-                if drawing.margin <= nearest <= drawing.within:
+                nearest = _at(shapes, checked, placed[step], out[row, box], core, drawing.margin)
+                if not drawing.margin <= nearest <= drawing.within:
+                    continue
+                if _is_clear(shapes, checked, placed, travelled, out[row, box], core, drawing.margin):
                     found[row] += 1
                     break
 
@@ -98,7 +103,7 @@ def _travel(placed, bends, path, travelled):
 
 @uncounted
 def _draw(drawing, shapes, checked, placed, key, first, box):
-    """Draws an upright box near a body at some step; false where its centre is outside the region."""
+    """Draws an upright box near a body at some step; gives the step, -1 where the centre is outside the region."""
     diagonal = 0.0
     for c in range(3):
         edge = drawing.smallest[c] + share(key, first + c) * (drawing.largest[c] - drawing.smallest[c])
@@ -113,7 +118,7 @@ def _draw(drawing, shapes, checked, placed, key, first, box):
     box[15] = 0.0
     step, body = int(share(key, first + 4) * placed.shape[0]), int(share(key, first + 5) * placed.shape[1])
     if not checked[body]:
-        return False
+        return -1
     along, up, around = share(key, first + 6), uniform(key, first + 7), math.pi * uniform(key, first + 8)
     away = share(key, first + 9) * (shapes.radii[body] + math.sqrt(diagonal) + drawing.within)
     flat = math.sqrt(1.0 - up * up)
@@ -122,32 +127,42 @@ def _draw(drawing, shapes, checked, placed, key, first, box):
     for c in range(3):
         box[9 + c] += placed[step, body, c] + along * (placed[step, body, 3 + c] - placed[step, body, c])
         inside = inside and drawing.lower[c] <= box[9 + c] <= drawing.upper[c]
-    return inside
+    return step if inside else -1
 
 
 @uncounted
-def _nearest(shapes, checked, placed, travelled, box, core, margin):
-    """The least distance of bodies from a box at the steps that are looked at; below the margin if that is not kept.
+def _at(shapes, checked, placed, box, core, margin):
+    """The distance of an arm from a box at one step; any below the margin if it is not kept."""
+    least = math.inf
+    for body in range(checked.shape[0]):
+        if checked[body] and least >= margin:
+            least = min(least, of_obstacle(shapes, placed, body, box, core)[0])
+    return least
+
+
+@uncounted
+def _is_clear(shapes, checked, placed, travelled, box, core, margin):
+    """Whether all bodies keep the margin from a box, at the steps and in between.
 
     Between two steps at which a body is d and e away, and travels no more than w, it stays (d + e - w) / 2 away. So
-    steps that a body cannot come too near in are left out, and the margin is kept between the steps, too.
+    steps that a body cannot come too near in are left out. Some steps are looked at first: most boxes are in the way of
+    one.
     """
-    last, least = placed.shape[0] - 1, math.inf
+    last = placed.shape[0] - 1
+    for i in range(FIRST):
+        if _at(shapes, checked, placed[i * last // (FIRST - 1)], box, core, margin) < margin:
+            return False
     for body in range(checked.shape[0]):
-        if not checked[body]:
-            continue
-        step = 0
-        distance = of_obstacle(shapes, placed[0], body, box, core)[0]
-        least = min(least, distance)
-        while least >= margin and step < last:
+        step, distance = 0, margin
+        if checked[body]:
+            distance = of_obstacle(shapes, placed[0], body, box, core)[0]
+        while checked[body] and step < last:
             after = step + 1
             while after < last and travelled[body, after + 1] - travelled[body, step] <= distance - margin:
                 after += 1
             further = of_obstacle(shapes, placed[after], body, box, core)[0]
             between = 0.5 * (distance + further - (travelled[body, after] - travelled[body, step]))
-            if between < margin:
-                return between
-            step, distance, least = after, further, min(least, further)
-        if least < margin:
-            return least
-    return least
+            if between < margin or further < margin:
+                return False
+            step, distance = after, further
+    return True

@@ -11,6 +11,10 @@ c92e0a45aeee257a9a489b49cf83370193fe5844, whose licences are beside this file: t
 `base_link`; here they are in the base frame of the arm. The i-th start of a random path belongs to its i-th waypoint,
 so only the first one is kept. Initial trajectories are those from the first start; `reinforcement` is the published
 network `FREEALL_Task` (`pirl_rl_test_1`). RL-ITG's joint interpolations, which do not follow the paths, are left out.
+
+Problems with obstacles, :data:`OBSTRUCTED`, have upright boxes besides: RL-ITG's `s`, `square` and
+``rlitg-obstacle-…``, the first path of each of its hundred scenes `random_obs`; and of CppFlow those of the Panda and
+three of the Fetch, whose starts are not published but drawn clear of the boxes. `tests/problems/write.py` has read them.
 """
 
 from __future__ import annotations
@@ -27,17 +31,27 @@ from ikgym.validation import FloatArray, known_name, read_only
 
 FOLDER = pathlib.Path(__file__).parent
 WAYPOINTS, TRAJECTORIES = FOLDER / "waypoints.npz", FOLDER / "trajectories.npz"
+#: All numbers of the problems with obstacles.
+OBSTRUCTED_FILE = FOLDER / "obstructed.npz"
 #: One over the resolution of waypoints and starts in [m], [rad] or 1, and of trajectories in [rad]; and the orders of
 #: the differences in which they are stored, which change little from row to row and so compress well.
 FINE, COARSE = 10**6, 10**5
 WAYPOINTS_ORDER, TRAJECTORIES_ORDER = 3, 2
 #: RL-ITG's drawn paths, the number of its random ones, and CppFlow's paths for the Fetch.
 DRAWN, RANDOM, ON_FETCH = ("hello", "rotation", "zig", "kaist", "sgvr"), 100, ("hello", "rot_yz", "rot_yz2")
+#: The problems with obstacles.
+OBSTRUCTED = (
+    *(f"rlitg-{path}" for path in ("s", "square")),
+    *(f"rlitg-obstacle-{i:03}" for i in range(RANDOM)),
+    *(f"cppflow-panda-{path}" for path in ("1cube", "2cubes", "flappy_bird")),
+    *(f"cppflow-fetch-{path}" for path in ("circle", "s", "square")),
+)
 NAMES = (
     *(f"rlitg-{path}" for path in DRAWN),
     *(f"rlitg-random-{i:03}" for i in range(RANDOM)),
     *(f"cppflow-{arm}-{path}" for arm in ("fetch_arm", "fetch") for path in ON_FETCH),
     "cppflow-panda-square",
+    *OBSTRUCTED,
 )
 #: Methods behind the initial trajectories, and their names in prose.
 METHODS = {
@@ -100,22 +114,48 @@ def trajectory(name: str, method: str) -> FloatArray:
     return _trajectories()[name, method]
 
 
+def boxes(name: str) -> FloatArray:
+    """The obstacles of a problem: centres and edges of upright boxes in [m], and angles about z in [rad]. Shape (b, 7).
+
+    Raises:
+        UnknownNameError: There is no such problem; the message has the nearest name.
+    """
+    known_name("problem", name, names())
+    return _boxes().get(name, read_only(np.empty((0, 7))))
+
+
 @functools.cache
 def _stored() -> dict[str, Waypoints]:
-    stored = _load(WAYPOINTS)
-    poses = _restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
+    stored, more = _load(WAYPOINTS), _load(OBSTRUCTED_FILE)
     starts = _parts(stored["starts"] / FINE, stored["start_counts"].tolist())
-    problems = zip(stored["names"].tolist(), poses, starts, strict=True)
+    starts += [row[None, :n] for row, n in zip(more["starts"] / FINE, more["joints_of"].tolist(), strict=True)]
+    names = stored["names"].tolist() + more["names"].tolist()
+    poses = [
+        pose
+        for one in (stored, more)
+        for pose in _restored(one["poses"], one["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
+    ]
+    problems = zip(names, poses, starts, strict=True)
     return {name: Waypoints(*_split(pose), read_only(start)) for name, pose, start in problems}
 
 
 @functools.cache
+def _boxes() -> dict[str, FloatArray]:
+    stored = _load(OBSTRUCTED_FILE)
+    parts = _parts(stored["boxes"], stored["box_counts"].tolist())
+    return {name: read_only(part) for name, part in zip(stored["names"].tolist(), parts, strict=True)}
+
+
+@functools.cache
 def _trajectories() -> dict[tuple[str, str], FloatArray]:
-    stored = _load(TRAJECTORIES)
-    keys = zip(stored["names"].tolist(), stored["methods"].tolist(), strict=True)
-    lengths = [len(_stored()[name].positions) for name in stored["names"].tolist()]
-    paths = _restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
-    return {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
+    stored, more = _load(TRAJECTORIES), _load(OBSTRUCTED_FILE)
+    out = {}
+    for names, one in ((stored["names"].tolist(), stored), (more["trajectory_names"].tolist(), more)):
+        lengths = [len(_stored()[name].positions) for name in names]
+        keys = zip(names, one["methods"].tolist(), strict=True)
+        paths = _restored(one["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
+        out |= {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
+    return out
 
 
 def _restored(packed: npt.NDArray[np.int32], lengths: Sequence[int], scale: int, order: int) -> list[FloatArray]:

@@ -19,7 +19,7 @@ from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.registry import Registry
-from ikgym.scenarios import files
+from ikgym.scenarios import files, obstructed
 from ikgym.scenarios.durations import duration
 from ikgym.scenarios.importing import imported
 from ikgym.scenarios.preview import Preview
@@ -50,7 +50,7 @@ SPLITS = {
     "validation": range(1_000_000, 2_000_000),
     "test": range(2_000_000, 3_000_000),
 }
-#: The files of the catalogue: those of the papers, paths for several arms, imperfect plants, arms that can touch things,
+#: The files of the catalogue: of the papers, paths for several arms, imperfect plants, arms that can touch something,
 #: problems of others, and those of the environments for learning.
 FILES = {
     family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"), key=lambda file: file.stem)
@@ -193,5 +193,7 @@ def _published(problem: str) -> Scenario:
 for _family, _files in FILES.items():
     for _file in _files:
         _registry.register(_file.stem, functools.partial(load, _file), listed=_family not in ("published", "learning"))
+for _name in problems.OBSTRUCTED:
+    _registry.register(_name, functools.partial(obstructed.scenario, _name), listed=False)
 for _name in problems.names("rlitg-random-"):
     _registry.register(_name, functools.partial(_published, _name), listed=False)

@@ -10,11 +10,11 @@ import ikgym
 from ikgym import problems
 
 RANDOM = problems.names("rlitg-random-")
-DRAWN = [name for name in problems.NAMES if name not in RANDOM]
+DRAWN = [name for name in problems.NAMES if name not in (*RANDOM, *problems.OBSTRUCTED)]
 
 
 def test_names():
-    assert len(problems.names()) == len(set(problems.names())) == 112
+    assert len(problems.names()) == len(set(problems.names())) == 220
     assert len(RANDOM) == 100
     assert [len(problems.waypoints(name).positions) for name in DRAWN] == [
         *(553, 209, 227, 478, 587),
@@ -42,7 +42,7 @@ def test_shapes_and_units(name):
 
 def test_the_numbers_have_not_changed():
     digest = hashlib.sha256()
-    for name in problems.names():
+    for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:]):
         for array in (*problems.waypoints(name), *(problems.trajectory(name, m) for m in problems.published(name))):
             digest.update(np.rint(1e6 * array).astype(np.int64).tobytes())
     assert digest.hexdigest()[:12] == "aa878e2b219e"
@@ -51,7 +51,7 @@ def test_the_numbers_have_not_changed():
 def test_the_first_waypoints_are_where_the_published_starts_are():
     """Base, tool, order of the quaternions and rest posture of the torso: all would show here."""
     arm = ikgym.arms.get("fetch_arm")
-    for name in problems.names("rlitg"):
+    for name in (*DRAWN[:5], *RANDOM):
         positions, quaternions, starts = problems.waypoints(name)
         rotations, there = arm.forward(starts)
         assert np.linalg.norm(there - positions[0], axis=1).max() < 1.5e-5
@@ -63,6 +63,8 @@ def test_published_trajectories_belong_to_their_paths():
     assert {name for name in problems.NAMES if problems.published(name)} == {
         *("rlitg-hello", "rlitg-rotation", "rlitg-zig"),
         *RANDOM,
+        "rlitg-square",
+        *problems.names("rlitg-obstacle-"),
     }
     for name in ("rlitg-hello", "rlitg-random-042"):
         positions, _, starts = problems.waypoints(name)

@@ -18,7 +18,7 @@ def controls():
 
 
 def motion(scenario, control):
-    """The joint coordinates at all steps that are nearest to a spline on the path of the tool, and if they converged."""
+    """The joint coordinates on the path that are nearest to a spline, at all steps, and whether they converged."""
     frames = scenario.frames(scenario.trajectory, scenario.steps + 1)
     near = JointSpline(control, scenario.trajectory.duration).joint_path(scenario.times(scenario.steps + 1))
     near = np.clip(near, scenario.arm.lower, scenario.arm.upper)

@@ -23,7 +23,8 @@ def waypoint_steps(waypoints):
 
 
 def test_names():
-    assert {*problems.names()} - {*problems.names("rlitg-random-")} == {*NAMES} - {"rlitg-random"}
+    made = {*problems.names("rlitg-random-"), *problems.OBSTRUCTED}
+    assert {*problems.names()} - made == {*NAMES} - {"rlitg-random"}
     assert not set(NAMES) & set(scenarios.names())
     assert scenarios.find("rlitg-random-007") is scenarios.get("rlitg-random-007")
     with pytest.raises(UnknownNameError, match="There is no scenario 'rlitg-random-100'"):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ikgym import scenarios
-from ikgym.kernels.bodies import near_rows
+from ikgym.kernels.bodies import OBSTACLE, near_rows
 from ikgym.trajectories.batch import paths_of
 from tests.scenarios.clear_motions import FILE, clearances, controls, motion, shares
 
@@ -34,7 +34,8 @@ class Search:
         self.times = np.linspace(0.0, scenario.trajectory.duration, TIMES)
         frames = scenario.trajectory.frames(self.times, arm)
         self.rotations, self.positions = frames[:, :9].reshape(-1, 3, 3), frames[:, 9:]
-        self.boxes = np.concatenate([_along(one, self.times, arm) for one in scenario.obstacles], axis=1)
+        along = [_along(one, self.times, arm) for one in scenario.obstacles]
+        self.boxes = np.concatenate([np.empty((TIMES, 0, OBSTACLE)), *along], axis=1)
         self.spread = _at_rest()
         unit = np.repeat(np.eye(CONTROL)[:, :, None], 1, axis=2)
         times = np.tile(self.times, (CONTROL, 1))

@@ -1,0 +1,50 @@
+"""CppFlow's rule: passed where all of it holds."""
+
+import numpy as np
+import pytest
+
+from baselines.evaluation.published_rule import verdict
+from ikgym import problems, scenarios
+from ikgym.exceptions import InvalidInputError
+
+
+def test_an_exact_path_passes_and_each_fault_fails():
+    scenario = scenarios.get("cppflow-fetch_arm-hello")
+    positions, quaternions, _ = problems.waypoints("cppflow-fetch_arm-hello")
+    nominal = scenario.nominal()[::10]
+    q = [scenario.start_of()]
+    for row in nominal[1:]:
+        q.append(scenario.arm.inverse(row[:9].reshape(3, 3), row[9:], start=q[-1], restarts=0)[0])
+    q = np.array(q)
+    exact = verdict(scenario, q)
+    assert exact.followed
+    assert exact.position < 1.5e-5
+    assert exact.passed == (exact.turn < np.radians(7.0) and exact.clearance > 0.0)
+    moved = q.copy()
+    moved[5, 1] += 1e-3
+    assert not verdict(scenario, moved).followed
+    beyond = q.copy()
+    beyond[5, 0] = scenario.arm.upper[0] + 0.1
+    assert not verdict(scenario, beyond).within
+    np.testing.assert_allclose(verdict(scenario, beyond).turn, np.abs(np.diff(beyond[:, 0])).max())
+
+
+def test_a_full_turn_of_a_joint_without_limits_is_no_motion():
+    name = "rlitg-random-041"
+    joints = problems.trajectory(name, "cloning")
+    assert np.abs(np.diff(joints, axis=0)).max() > 6.0
+    assert verdict(scenarios.get(name), joints).turn < 1.0
+
+
+def test_published_trajectories_fail():
+    judged = [verdict(scenarios.get(name), problems.trajectory(name, "greedy")) for name in problems.OBSTRUCTED[1:12]]
+    assert not any(one.passed for one in judged)
+    assert not any(one.followed for one in judged)
+    assert {one.clearance > 0.0 for one in judged} == {False, True}
+
+
+def test_bad_input():
+    with pytest.raises(InvalidInputError, match="with a published path, got 'panda-circle'"):
+        verdict(scenarios.get("panda-circle"), np.zeros((1, 7)))
+    with pytest.raises(InvalidInputError, match="q: expected shape"):
+        verdict(scenarios.get("rlitg-hello"), np.zeros((1, 7)))

@@ -1,0 +1,127 @@
+"""Boxes that are drawn: clear of the motion, near to it, and the same however they are drawn."""
+
+import coal
+import gymnasium as gym
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ikgym
+from ikgym.exceptions import InvalidInputError
+from ikgym.random_boxes import RandomBoxes
+from tests.comparison import identical
+
+SCENARIO = ikgym.scenarios.get("panda-clutter-random")
+(BOXES,) = SCENARIO.obstacles
+
+
+def reference(seed, steps=SCENARIO.steps + 1):
+    return SCENARIO.episode(seed).joint_path(np.linspace(0.0, SCENARIO.steps * SCENARIO.dt, steps))
+
+
+def test_the_motion_keeps_its_distance_from_each_box_and_comes_near_it():
+    """coal is the judge where it comes nearest, also between the steps."""
+    bodies = SCENARIO.arm.bodies
+    arm = SCENARIO.arm.replace(bodies=bodies.replace(ignored=[(a, b) for a in bodies.names for b in bodies.names]))
+    for seed in (0, 1, 2):
+        path = reference(seed, 10 * SCENARIO.steps + 1)
+        for box in SCENARIO.obstacles_of(seed):
+            distances, pairs = arm.clearance(path, [box])
+            for i in np.argsort(distances)[:200:50]:
+                np.testing.assert_allclose(by_coal(arm, path[i], pairs[i, 0], box), distances[i], atol=1e-7)
+            assert BOXES.margin <= distances.min() <= BOXES.within
+
+
+def by_coal(arm, q, body, box):
+    """The distance of a body from a box, by coal."""
+    start, end = ends(arm, q, body)
+    length = np.linalg.norm(end - start)
+    turned = Rotation.align_vectors([(end - start) / length], [[0.0, 0.0, 1.0]])[0].as_matrix()
+    capsule = coal.Capsule(arm.bodies.radii[body], length), coal.Transform3s(turned, 0.5 * (start + end))
+    other = coal.Box(*box.size), coal.Transform3s(np.array(box.rotation), np.array(box.position))
+    return coal.distance(*capsule, *other, coal.DistanceRequest(), coal.DistanceResult())
+
+
+def ends(arm, q, body):
+    """Both ends of a body's segment in the base frame."""
+    link = arm.bodies.links[body]
+    points = []
+    for point in (arm.bodies.starts[body], arm.bodies.ends[body]):
+        part = arm.replace(
+            bodies=ikgym.arms.bodies.Bodies(),
+            **{name: getattr(arm, name)[:link] for name in FIELDS},
+            tool=point,
+            tool_rotation=np.eye(3),
+        )
+        points.append(part.forward(q[:link])[1])
+    return points
+
+
+FIELDS = (
+    "offsets",
+    "axes",
+    "prismatic",
+    "lower",
+    "upper",
+    "velocity_limit",
+    "acceleration_limit",
+    "home",
+    "joint_names",
+)
+
+
+def test_single_and_vector_environments_draw_the_same_boxes():
+    options = {"scenario": SCENARIO, "preview": 1}
+    native = gym.make_vec("RedundantIK-v0", num_envs=3, **options)
+    sync = gym.make_vec("RedundantIK-v0", num_envs=3, vectorization_mode="sync", **options)
+    for seed in (5, None):
+        first, second = (envs.reset(seed=seed)[0]["obstacles"] for envs in (native, sync))
+        assert identical(first, second)
+    first = native.reset(seed=5)[0]["obstacles"]
+    for row in range(3):
+        single = gym.make("RedundantIK-v0", **options).reset(seed=5 + row)[0]["obstacles"]
+        assert identical(first[row], single)
+        assert identical(single, np.array([box.numbers() for box in SCENARIO.obstacles_of(5 + row)]))
+    assert native.observation_space.contains(native.reset(seed=7)[0])
+
+
+def test_other_draws_stay_as_they_are():
+    """The boxes have a stream of their own."""
+    without = SCENARIO.replace(obstacles=())
+    assert identical(SCENARIO.nominal(3), without.nominal(3))
+    assert not identical(SCENARIO.obstacles_of(3)[0].position, SCENARIO.obstacles_of(4)[0].position)
+
+
+def test_an_episode_with_its_boxes_fixed_is_the_same(tmp_path):
+    import baselines
+
+    short = SCENARIO.replace(steps=200)
+    fixed = short.replace(trajectory=short.episode(2), obstacles=short.obstacles_of(2))
+    assert identical(baselines.track(short, "dls", seed=2).q, baselines.track(fixed, "dls").q)
+    SCENARIO.save(tmp_path / "boxes.toml")
+    again = ikgym.scenarios.load(tmp_path / "boxes.toml")
+    assert identical(again.obstacles_of(2)[9].position, SCENARIO.obstacles_of(2)[9].position)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"count": 0}, "count of obstacle 'box'"),
+        ({"count": 10**6}, "count of obstacle 'box'"),
+        ({"smallest": [0.0, 0.1, 0.1]}, "smallest of obstacle 'box': expected numbers above 0"),
+        ({"lower": [0.0, 0.0, 2.0]}, "expected lower <= upper"),
+        ({"within": 0.01}, "within of obstacle 'box'"),
+        ({"margin": float("nan")}, "margin of obstacle 'box'"),
+    ],
+)
+def test_bad_input(changes, message):
+    with pytest.raises(InvalidInputError, match=message):
+        BOXES.replace(**changes)
+
+
+def test_no_room_and_no_motion():
+    crowded = RandomBoxes("box", [-0.1] * 3, [0.1] * 3, [0.5] * 3, [0.5] * 3)
+    with pytest.raises(InvalidInputError, match="expected room for 10 boxes"):
+        SCENARIO.replace(obstacles=[crowded]).obstacles_of(0)
+    with pytest.raises(InvalidInputError, match="expected the trajectory of a random joint motion"):
+        SCENARIO.replace(trajectory=SCENARIO.episode(0))
