@@ -14,7 +14,7 @@ from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_sp
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.kernels.limits import FASTEST
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray
 
@@ -25,9 +25,9 @@ APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
 # Share of what is missing to the clearance that a step takes back, and share of the acceleration limits that braking
 # reckons with: the joints have a task besides.
 RETREAT, BRAKES = 0.1, 0.5
-# A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; share of the
-# largest joint velocities that leads away from what is near.
-LEVER, AWAY = 0.05, 0.5
+# A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of the
+# largest joint velocities and, in [1/s], of the way to a stop that lead away from what is near.
+LEVER, AWAY, TO_STOP = 0.05, 0.5, 3.0
 # A row that is met so closely holds the arm back, in [m/s].
 MET = 1e-9
 
@@ -98,7 +98,7 @@ def aside(factor, weight, gradient, motion):
 
 
 @inner
-def keep_clear(numbers, model, hessian, weight, near, bounds, velocity):
+def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
     ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and gently,
@@ -107,19 +107,21 @@ def keep_clear(numbers, model, hessian, weight, near, bounds, velocity):
 
     Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,
     (d* - d) P ∇d / (∇dᵀ P ∇d) with P = w H⁻¹, weighted by (1 - d / d*)². All of them together make at most a share of
-    the largest joint velocities.
+    the largest joint velocities, and less near a stop.
 
     Args:
         numbers: The :class:`AmongBodiesNumbers`.
         model: The :class:`Model`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
         hessian: H of the program, in its upper left corner.
         weight: w, the weight of the joint motion in it.
-        near: How many rows there are, signed distances in [m] of shape (ROWS,), and gradients, of shape (ROWS, n).
+        near: How many rows there are, and distances, distances of influence and gradients of
+            :func:`near_distances`.
         bounds: Receives the least rates in [m/s]; -inf where no joint changes the distance. Shape (ROWS,).
         velocity: Receives the joint velocities. Shape (n,).
     """
-    (count, distances, gradients), influence, dt = near, numbers.influence, model.dt
-    n, braking, fastest = velocity.shape[0], numbers.limits[BRAKING], numbers.limits[FASTEST]
+    (count, distances, reaches, gradients), dt = near, model.dt
+    n, braking = velocity.shape[0], numbers.limits[BRAKING]
     factor, motion = hessian[:n, :n].copy(), np.empty(n)
     velocity[:] = 0.0
     usable = count > 0 and cholesky(factor)
@@ -136,13 +138,21 @@ def keep_clear(numbers, model, hessian, weight, near, bounds, velocity):
         part = lever / (ASIDE * square)
         share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
         bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
-        missing = influence - distances[i]
-        motion *= numbers.repulsion * min(missing / influence, 1.0) ** 2 * missing / (lever + LEVER * LEVER)
+        missing = reaches[i] - distances[i]
+        motion *= numbers.repulsion * min(missing / reaches[i], 1.0) ** 2 * missing / (lever + LEVER * LEVER)
         velocity += motion
+    _moderate(numbers.limits, q, velocity)
+
+
+@inner
+def _moderate(limits, q, velocity):
+    """Shortens joint velocities to a share of the largest ones, and of the way to a stop: shapes (5, n), (n,), (n,)."""
     share = 1.0
-    for j in range(n):
-        if abs(velocity[j]) > AWAY * fastest[j]:
-            share = min(share, AWAY * fastest[j] / abs(velocity[j]))
+    for j in range(q.shape[0]):
+        room = limits[UPPER, j] - q[j] if velocity[j] > 0.0 else q[j] - limits[LOWER, j]
+        most = min(AWAY * limits[FASTEST, j], TO_STOP * max(room, 0.0))
+        if abs(velocity[j]) > most:
+            share = min(share, most / abs(velocity[j]))
     velocity *= share
 
 
@@ -154,18 +164,18 @@ def qp_step_among(model, numbers, seen, memory, answer):
     n, size = q.shape[1], q.shape[1] + numbers.scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     preferred, x, rows, bounds = np.empty(n), np.empty(size), np.zeros((ROWS, size)), np.empty(ROWS)
-    distances, away, (shapes, checked) = np.empty(ROWS), np.empty(n), bodies_of(numbers.bodies)
+    distances, reaches, away, (shapes, checked) = np.empty(ROWS), np.empty(ROWS), np.empty(n), bodies_of(numbers.bodies)
     for row in range(q.shape[0]):
         boxes, gradients = numbers.boxes[row % numbers.boxes.shape[0]], rows[:, :n]
         args = shapes, checked, boxes, q[row], numbers.influence
-        count = near_distances(model.chain, *args, distances, gradients)
+        count = near_distances(model.chain, *args, distances, reaches, gradients)
         for j in range(n):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
         jac, shift = jacobian[row], motion[row]
         parts = hessian, linear, lower, upper
         weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
-        near = count, distances, gradients
-        keep_clear(numbers, model, hessian, weight, near, bounds, away)
+        near = count, distances, reaches, gradients
+        keep_clear(numbers, model, q[row], hessian, weight, near, bounds, away)
         for j in range(n):
             preferred[j] += away[j]
             linear[j] += weight * away[j]
