@@ -119,11 +119,14 @@ def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
             :func:`near_distances`.
         bounds: Receives the least rates in [m/s]; -inf where no joint changes the distance. Shape (ROWS,).
         velocity: Receives the joint velocities. Shape (n,).
+
+    Returns:
+        How much is left of other preferences: the smallest d / d*, at most 1.
     """
     (count, distances, reaches, gradients), dt = near, model.dt
     n, braking = velocity.shape[0], numbers.limits[BRAKING]
     factor, motion = hessian[:n, :n].copy(), np.empty(n)
-    velocity[:] = 0.0
+    velocity[:], nearest = 0.0, 1.0
     usable = count > 0 and cholesky(factor)
     for i in range(count):
         change, square = 0.0, 0.0
@@ -141,7 +144,9 @@ def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
         missing = reaches[i] - distances[i]
         motion *= numbers.repulsion * min(missing / reaches[i], 1.0) ** 2 * missing / (lever + LEVER * LEVER)
         velocity += motion
+        nearest = min(nearest, distances[i] / reaches[i])
     _moderate(numbers.limits, q, velocity)
+    return min(max(nearest, 0.0), 1.0)
 
 
 @inner
@@ -175,8 +180,9 @@ def qp_step_among(model, numbers, seen, memory, answer):
         parts = hessian, linear, lower, upper
         weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
         near = count, distances, reaches, gradients
-        keep_clear(numbers, model, q[row], hessian, weight, near, bounds, away)
+        left = keep_clear(numbers, model, q[row], hessian, weight, near, bounds, away)
         for j in range(n):
+            away[j] -= (1.0 - left) * preferred[j]
             preferred[j] += away[j]
             linear[j] += weight * away[j]
         iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
