@@ -12,8 +12,10 @@ from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.validation import FloatArray
 
 # Most pairs that are looked at, the nearest ones, and the most rows, two for each.
-PAIRS = 8
+PAIRS = 12
 ROWS = 2 * PAIRS
+# Share of the distance of influence at which two bodies of the arm are looked at: they are always near each other.
+OWN = 0.33
 # A nearest point so close to the end of a body's core is that end, in [m].
 AT_END = 1e-9
 # A joint motion that changes a distance by less than this for a unit of joint motion is no way to change it, in [m].
@@ -67,7 +69,7 @@ def bodies_of(block):
 
 
 @inner
-def near_distances(chain, shapes, checked, boxes, q, within, distances, gradients):
+def near_distances(chain, shapes, checked, boxes, q, within, distances, reaches, gradients):
     """Signed distances of the pairs that are nearer than some distance, the nearest first, and their gradients.
 
     A body whose nearest point is an end of its core has a second row: the distance of the other end from the plane
@@ -82,6 +84,8 @@ def near_distances(chain, shapes, checked, boxes, q, within, distances, gradient
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         within: The distance in [m].
         distances: Receives signed distances in [m]. Shape (ROWS,).
+        reaches: Receives the distances from which on they are looked at: ``within`` for obstacles, a share of it for
+            two bodies of the arm. Shape (ROWS,).
         gradients: Receives their gradients. Shape (ROWS, n).
 
     Returns:
@@ -93,12 +97,15 @@ def near_distances(chain, shapes, checked, boxes, q, within, distances, gradient
     found, count = nearest(shapes, boxes, checked, placed, core, within, near), 0
     for i in range(found):
         (first, second), vector = near[1][i], near[2][i]
-        distances[count] = near[0][i]
+        reach = within if second >= shapes.links.shape[0] else OWN * within
+        if near[0][i] > reach:
+            continue
+        distances[count], reaches[count] = near[0][i], reach
         gradient(chain.prismatic, shapes, joints, first, second, vector, gradients[count])
         count += 1
         rise = _other_end(placed[first], vector)
-        if 0.0 <= rise < within - near[0][i]:
-            distances[count] = near[0][i] + rise
+        if 0.0 <= rise < reach - near[0][i]:
+            distances[count], reaches[count] = near[0][i] + rise, reach
             gradient(chain.prismatic, shapes, joints, first, second, vector, gradients[count])
             count += 1
     return count
@@ -125,7 +132,7 @@ def _other_end(body, vector):
 
 
 @inner
-def repel(distances, gradients, count, within, gain, velocity):
+def repel(distances, reaches, gradients, count, gain, velocity):
     """Adds joint velocities that lead away from what is near, as a potential field does (Khatib 1986).
 
     Each pair asks for the joint motion that would take it out of the distance of influence d*, (d* - d) ∇d / ‖∇d‖²,
@@ -133,9 +140,9 @@ def repel(distances, gradients, count, within, gain, velocity):
 
     Args:
         distances: See :func:`near_distances`. Shape (ROWS,).
+        reaches: Likewise, the distances of influence d*. Shape (ROWS,).
         gradients: Likewise. Shape (ROWS, n).
         count: How many there are.
-        within: The distance of influence, in [m].
         gain: In [1/s].
         velocity: Joint velocities in [rad/s] or [m/s], added to. Shape (n,).
     """
@@ -143,7 +150,7 @@ def repel(distances, gradients, count, within, gain, velocity):
         square = LEVER * LEVER
         for j in range(velocity.shape[0]):
             square += gradients[i, j] * gradients[i, j]
-        missing = within - distances[i]
-        weight = gain * min(missing / within, 1.0) ** 2 * missing / square
+        missing = reaches[i] - distances[i]
+        weight = gain * min(missing / reaches[i], 1.0) ** 2 * missing / square
         for j in range(velocity.shape[0]):
             velocity[j] += weight * gradients[i, j]

@@ -6,14 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, repel
+from baselines.solvers.linear_algebra import dot
+from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances
 from baselines.solvers.quadratic_program.program import held_back, left_over, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import FloatArray
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
@@ -23,6 +25,9 @@ APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
 # Share of what is missing to the clearance that a step takes back, and share of the acceleration limits that braking
 # reckons with: the joints have a task besides.
 RETREAT, BRAKES = 0.1, 0.5
+# A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of the
+# largest joint velocities and, in [1/s], of the way to a stop that lead away from what is near.
+LEVER, AWAY, TO_STOP = 0.05, 0.5, 3.0
 # A row that is met so closely holds the arm back, in [m/s].
 MET = 1e-9
 
@@ -74,56 +79,86 @@ def largest_approach(distance, clearance, dt, change, share):
 
 
 @inner
-def aside(factor, weight, gradient):
-    """The share of a gradient's square that lies in joint motions which leave the task alone: w ∇dᵀ H⁻¹ ∇d / ‖∇d‖².
+def aside(factor, weight, gradient, motion):
+    """A gradient in the joint motions that leave the task alone, w H⁻¹ ∇d, and how much it changes the distance by.
 
     Args:
         factor: L of H = (J Δt)ᵀ J Δt + w I = L Lᵀ. Shape (n, n).
         weight: w.
-        gradient: ∇d, not 0. Shape (n,).
+        gradient: ∇d. Shape (n,).
+        motion: Receives w H⁻¹ ∇d. Shape (n,).
+
+    Returns:
+        w ∇dᵀ H⁻¹ ∇d, at most ‖∇d‖².
     """
-    n, square, total = gradient.shape[0], 0.0, 0.0
-    solved = np.empty(n)
-    for i in range(n):
-        solved[i] = gradient[i]
-        for k in range(i):
-            solved[i] -= factor[i, k] * solved[k]
-        solved[i] /= factor[i, i]
-        square += gradient[i] * gradient[i]
-        total += solved[i] * solved[i]
-    return weight * total / square
+    motion[:] = gradient
+    cholesky_solve(factor, motion)
+    motion *= weight
+    return dot(motion, gradient)
 
 
 @inner
-def clearance_bounds(numbers, dt, hessian, weight, distances, gradients, count, bounds):
-    """Least rates of distances, in [m/s]: ∇dᵀ q̇ is at least minus :func:`largest_approach`.
+def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
+    """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
-    What the joints can do aside from the task begins early and gently, since they have little acceleration for it. What
-    the task itself does, such as to lead the tool to a table, is slowed down as late as braking allows.
+    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and gently,
+    since they have little acceleration for it. What the task itself does, such as to lead the tool to a table, is
+    slowed down as late as braking allows.
+
+    Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,
+    (d* - d) P ∇d / (∇dᵀ P ∇d) with P = w H⁻¹, weighted by (1 - d / d*)². All of them together make at most a share of
+    the largest joint velocities, and less near a stop.
 
     Args:
         numbers: The :class:`AmongBodiesNumbers`.
-        dt: Δt in [s].
+        model: The :class:`Model`.
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
         hessian: H of the program, in its upper left corner.
-        weight: Weight of the joint motion in it.
-        distances: Signed distances in [m]. Shape (ROWS,).
-        gradients: Their gradients. Shape (ROWS, n).
-        count: How many there are.
-        bounds: Receives the rates; -inf where no joint changes the distance. Shape (ROWS,).
+        weight: w, the weight of the joint motion in it.
+        near: How many rows there are, and distances, distances of influence and gradients of
+            :func:`near_distances`.
+        bounds: Receives the least rates in [m/s]; -inf where no joint changes the distance. Shape (ROWS,).
+        velocity: Receives the joint velocities. Shape (n,).
+
+    Returns:
+        How much is left of other preferences: the smallest d / d*, at most 1.
     """
-    n, braking = gradients.shape[1], numbers.limits[BRAKING]
-    factor = hessian[:n, :n].copy()
+    (count, distances, reaches, gradients), dt = near, model.dt
+    n, braking = velocity.shape[0], numbers.limits[BRAKING]
+    factor, motion = hessian[:n, :n].copy(), np.empty(n)
+    velocity[:], nearest = 0.0, 1.0
     usable = count > 0 and cholesky(factor)
     for i in range(count):
-        change = 0.0
+        change, square = 0.0, 0.0
         for j in range(n):
             if gradients[i, j] != 0.0:
                 change += BRAKES * abs(gradients[i, j]) * braking[j]
+                square += gradients[i, j] * gradients[i, j]
         bounds[i] = -np.inf
-        if change > 0.0:
-            part = aside(factor, weight, gradients[i]) / ASIDE if usable else 0.0
-            share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
-            bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
+        if change == 0.0 or not usable:
+            continue
+        lever = aside(factor, weight, gradients[i], motion)
+        part = lever / (ASIDE * square)
+        share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
+        bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
+        missing = reaches[i] - distances[i]
+        motion *= numbers.repulsion * min(missing / reaches[i], 1.0) ** 2 * missing / (lever + LEVER * LEVER)
+        velocity += motion
+        nearest = min(nearest, distances[i] / reaches[i])
+    _moderate(numbers.limits, q, velocity)
+    return min(max(nearest, 0.0), 1.0)
+
+
+@inner
+def _moderate(limits, q, velocity):
+    """Shortens joint velocities to a share of the largest ones, and of the way to a stop: shapes (5, n), (n,), (n,)."""
+    share = 1.0
+    for j in range(q.shape[0]):
+        room = limits[UPPER, j] - q[j] if velocity[j] > 0.0 else q[j] - limits[LOWER, j]
+        most = min(AWAY * limits[FASTEST, j], TO_STOP * max(room, 0.0))
+        if abs(velocity[j]) > most:
+            share = min(share, most / abs(velocity[j]))
+    velocity *= share
 
 
 @kernel
@@ -134,18 +169,22 @@ def qp_step_among(model, numbers, seen, memory, answer):
     n, size = q.shape[1], q.shape[1] + numbers.scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     preferred, x, rows, bounds = np.empty(n), np.empty(size), np.zeros((ROWS, size)), np.empty(ROWS)
-    distances, (shapes, checked) = np.empty(ROWS), bodies_of(numbers.bodies)
+    distances, reaches, away, (shapes, checked) = np.empty(ROWS), np.empty(ROWS), np.empty(n), bodies_of(numbers.bodies)
     for row in range(q.shape[0]):
         boxes, gradients = numbers.boxes[row % numbers.boxes.shape[0]], rows[:, :n]
         args = shapes, checked, boxes, q[row], numbers.influence
-        count = near_distances(model.chain, *args, distances, gradients)
+        count = near_distances(model.chain, *args, distances, reaches, gradients)
         for j in range(n):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
-        repel(distances, gradients, count, numbers.influence, numbers.repulsion, preferred)
         jac, shift = jacobian[row], motion[row]
         parts = hessian, linear, lower, upper
         weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
-        clearance_bounds(numbers, model.dt, hessian, weight, distances, gradients, count, bounds)
+        near = count, distances, reaches, gradients
+        left = keep_clear(numbers, model, q[row], hessian, weight, near, bounds, away)
+        for j in range(n):
+            away[j] -= (1.0 - left) * preferred[j]
+            preferred[j] += away[j]
+            linear[j] += weight * away[j]
         iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
         for j in range(n):
             qdot[row, j] = x[j]

@@ -86,13 +86,13 @@ def null_space_step_among(model, numbers, seen, memory, answer):
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
-    aim, distances, gradients = np.empty(q.shape), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
+    aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
     objective_rows(numbers, q, aim)
     aim *= numbers.secondary_gain
     for row in range(q.shape[0]):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
-        count = near_distances(model.chain, *around_it, q[row], numbers.influence, distances, gradients)
-        repel(distances, gradients, count, numbers.influence, model.dt * numbers.repulsion, aim[row])
+        count = near_distances(model.chain, *around_it, q[row], numbers.influence, distances, reaches, gradients)
+        repel(distances, reaches, gradients, count, model.dt * numbers.repulsion, aim[row])
     aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 

@@ -1,0 +1,122 @@
+"""The policies `qp` and `null_space` among bodies: against quadprog, and in motion."""
+
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.solvers.quadratic_program.among_bodies import largest_approach
+from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles import Box, Sphere
+from ikgym.trajectories import PathTrajectory
+from ikgym.trajectories.paths.line import Line
+from ikgym.trajectories.time_laws import Quintic
+from tests.baselines.solvers.quadratic_program.paths import circle
+from tests.comparison import identical
+
+
+def clear_scenario(obstacles=(), **changes):
+    """A circle of the Panda with hand, and something beside its elbow."""
+    return circle("panda-hand", radius=0.08, obstacles=obstacles, collisions=True, **changes)
+
+
+def played(scenario, policy):
+    """Largest position error in [m], the smallest clearance in [m], and whether the arm was stopped."""
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
+    seen, _ = env.reset(seed=0)
+    state, errors, clearances, info = None, [], [], {}
+    for _ in range(scenario.steps):
+        action, state = policy.predict(seen, state)
+        seen, *_, info = env.step(action)
+        errors.append(info["position_error"])
+        clearances.append(float(info["clearance"]))
+    return max(errors), min(clearances), bool(info["collision"])
+
+
+def test_a_pair_can_brake_before_it_reaches_the_clearance():
+    for change in (1e-3, 1e-2, np.inf):
+        distance, speed, dt = 0.2, 2.0, 1e-3
+        while distance - 0.005 > 1e-6:
+            allowed = largest_approach(distance, 0.005, dt, change, 0.25)
+            assert allowed > 0.0
+            slowest = speed - 2.0 * change  # the joints can make twice of what is reckoned with
+            assert distance > 0.1 or allowed >= slowest - 1e-12
+            speed = min(allowed, speed)
+            distance -= speed * dt
+        assert distance >= 0.005
+
+
+def test_without_bodies_nothing_changes():
+    scenario = circle("panda")
+    assert not scenario.collides
+    one, other = (baselines.make("qp", scenario, **settings) for settings in ({}, {"influence": 0.5, "repulsion": 9.0}))
+    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
+    assert not one.among_bodies
+    assert identical(one.predict(seen)[0], other.predict(seen)[0])
+
+
+BESIDE = Box("box", [0.12, 0.17, 0.62], [0.1, 0.1, 0.1])
+
+
+def test_keeps_clear_of_a_box_that_comes():
+    """A sphere moves to the elbow, which gives way; an arm that takes no notice is hit."""
+    elbow = [0.05, 0.35, 0.6]
+    motion = PathTrajectory(Line(elbow, [0.05, 0.1, 0.6]), Quintic(0.2, 1.0))
+    scenario = clear_scenario((Sphere("ball", [0.0, 0.0, 0.0], 0.05, motion=motion),))
+    assert scenario.obstacles_shown
+    error, clearance, stopped = played(scenario, baselines.make("qp", scenario))
+    assert not stopped
+    assert clearance > 4e-3
+    assert error < 1e-4
+    assert played(scenario, baselines.make("dls", scenario))[2]
+
+
+def test_needs_the_obstacles_that_move():
+    motion = PathTrajectory(Line([0.9, 0.9, 0.6], [0.9, 0.5, 0.6]), Quintic(0.2, 1.0))
+    scenario = clear_scenario((Sphere("ball", [0.0, 0.0, 0.0], 0.05, motion=motion),))
+    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
+    policy = baselines.make("qp", scenario)
+    policy.predict(seen)
+    with pytest.raises(InvalidInputError, match="obstacles"):
+        policy.predict({key: value for key, value in seen.items() if key != "obstacles"})
+
+
+@pytest.mark.parametrize("name", ["qp", "null_space"])
+def test_a_batch_is_its_rows(name):
+    scenario = clear_scenario((BESIDE,))
+    policy, rng = baselines.make(name, scenario), np.random.default_rng(0)
+    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
+    rows = [{**seen, "q": seen["q"] + 0.02 * rng.normal(size=7)} for _ in range(5)]
+    batch = {key: np.stack([row[key] for row in rows]) for key in seen}
+    together = policy.predict(batch)[0]
+    for row, action in zip(rows, together, strict=True):
+        assert identical(policy.predict(row)[0], action)
+
+
+@pytest.mark.parametrize("name", ["panda-table", "panda-pillar"])
+def test_follows_where_there_is_a_way(name):
+    scenario = ikgym.scenarios.get(name)
+    error, clearance, stopped = played(scenario, baselines.make("qp", scenario))
+    assert not stopped
+    assert error < 1e-4
+    assert clearance > 4e-3
+
+
+def test_null_space_leads_away():
+    scenario = clear_scenario((BESIDE,))
+    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
+    policy = baselines.make("null_space", scenario, secondary_gain=0.0)
+    action = policy.predict(seen)[0]
+    still = policy.replace(repulsion=0.0).predict(seen)[0]
+    unit = scenario.dt * scenario.velocity_limit * (action.astype(float) - still)
+    arm, q = scenario.arm, seen["q"]
+    away = 1e-3 * unit / np.linalg.norm(unit)
+    assert arm.clearance(q + away, (BESIDE,))[0] > arm.clearance(q, (BESIDE,))[0]
+    np.testing.assert_allclose(arm.jacobian(q) @ away, 0.0, atol=1e-7)
+
+
+def test_numbers_out_of_range():
+    scenario = clear_scenario((BESIDE,))
+    for settings in ({"influence": 0.004}, {"clearance": -1.0}, {"repulsion": 2.0 / scenario.dt}):
+        with pytest.raises(InvalidInputError):
+            baselines.make("qp", scenario, **settings)
