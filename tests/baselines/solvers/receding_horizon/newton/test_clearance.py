@@ -1,7 +1,5 @@
 """Clearance as a limit of the interior point method: its derivatives, and its optima against IPOPT's."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -35,11 +33,11 @@ def obstructed():
     velocity = np.array([0.6, 0.4, -0.5, 0.2, 0.3, -0.2, 0.1])
     state = State(arm.home, velocity, np.array([arm.home, velocity, np.zeros(7), np.zeros(7)]))
     end = arm.home + DT * AT[-1] * velocity
-    elbow = dataclasses.replace(BODIES, radii=[1e-9, 1e-9])
-    height = arm.replace(bodies=elbow).clearance(end, [HalfSpace("floor", [0, 0, 0], [0, 0, 1])])[0]
-    assert height > 0.2
-    ball = Sphere("ball", point(arm, end, 0) + np.array([0.02, 0.105, 0.0]), 0.05)
-    floor = HalfSpace("floor", point(arm, end, 1) - np.array([0.0, 0.0, 0.0505]), [0.0, 0.0, 1.0])
+    move = point(arm, end, 0) - point(arm, arm.home, 0)
+    ahead = move / np.linalg.norm(move)
+    # Half a millimetre nearer than the margin, each.
+    ball = Sphere("ball", point(arm, end, 0) + (0.06 + 0.05 + 0.5 * MARGIN) * ahead, 0.05)
+    floor = HalfSpace("floor", point(arm, end, 1) - [0.0, 0.0, 0.05 + 0.5 * MARGIN], [0.0, 0.0, 1.0])
     return arm, state, (ball, floor)
 
 
