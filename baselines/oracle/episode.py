@@ -24,7 +24,7 @@ from ikgym.validation import FloatArray, whole_number
 
 # Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.
 FIRST = 8
-# Least distance of bodies at the knots, in [m]. Between two of them it may be less, and at 1 µm the plant stops the arm.
+# Least distance of bodies at the knots, in [m]: between two it may be less, and at 1 µm the plant stops the arm.
 CLEARANCE = 1e-4
 
 

@@ -37,6 +37,8 @@ class RecedingHorizonForesight(RecedingHorizon):
     in the far end of a plan that so few steps cannot settle, so that it looks 1.5 s ahead, at whatever control period;
     the lengths of its blocks are those of 1 ms in time, too, since the path turns as quickly for a slow controller.
 
+    **Among bodies** that may not touch, plans are made in the same way, for arms without limits, too.
+
     Args:
         horizon: As in ``rhc``. None for 3,001, and 1.5 s for arms with limits.
         iterations: As in ``rhc``, where None is the optimum. Here it is 1, and 3 for arms with limits.

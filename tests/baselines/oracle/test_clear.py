@@ -10,7 +10,7 @@ from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.search import polish
 from ikgym.obstacles import Sphere
 
-SEED, STEPS = 1, 150
+SEED, STEPS = 3, 150
 QUICK = Search(starts=6, generations=1, chains=2, rounds=2, polished=2, knots=20)
 FREE = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
 
@@ -23,9 +23,10 @@ def free():
 @pytest.fixture(scope="module")
 def ball(free):
     """A ball that the cheapest path goes some millimetres into."""
-    elbow = FREE.arm.joint_points(free.q[-1])[3, 0]
-    for shift in np.linspace(0.2, 0.0, 81):
-        ball = Sphere("ball", elbow + np.array([0.0, shift, shift]), 0.05)
+    before, after = (FREE.arm.joint_points(q)[3, 0] for q in (free.q[0], free.q[-1]))
+    ahead = (after - before) / np.linalg.norm(after - before)
+    for shift in np.linspace(0.2, 0.0, 401):
+        ball = Sphere("ball", after + shift * ahead, 0.05)
         if FREE.arm.clearance(free.q, [ball])[0].min() < -2e-3:
             return ball
     raise AssertionError

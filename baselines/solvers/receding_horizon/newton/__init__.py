@@ -10,6 +10,9 @@ times as much on 8 validation episodes of the former set, and loses one of 6 of 
 with limits multipliers do as well (0.995 (0.992 to 0.999) on 24 episodes of `panda-random`, in 0.23 times the time);
 where the limits are active they cost 4 times as much (`panda-fast`) to 200 times (`panda-edge`).
 
+Among bodies that may not touch, the interior point method has the clearance at each knot as one more limit
+(:mod:`clearance`).
+
 Arguments of most kernels:
 
 - ``problem``: a :class:`workspace.PathProblem` of K knots.

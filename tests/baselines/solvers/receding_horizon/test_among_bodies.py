@@ -1,5 +1,7 @@
 """Receding horizons among bodies: nothing touches, and what is observed of obstacles counts."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,8 @@ import ikgym
 from baselines.episodes import rollouts
 from ikgym.obstacles import Sphere
 from ikgym.random_boxes import RandomBoxes
-from ikgym.trajectories import Sampled
 
-STEPS = 300
+SEED, STEPS = 3, 300
 
 
 def total(episode):
@@ -20,16 +21,17 @@ def total(episode):
 def between(q):
     """A path with nine configurations between each two."""
     shares = np.linspace(0.0, 1.0, 11)[1:, None]
-    return np.concatenate([before + shares * (after - before) for before, after in zip(q, q[1:], strict=False)])
+    return np.concatenate([before + shares * (after - before) for before, after in itertools.pairwise(q)])
 
 
 def elbow_obstacle():
     """A motion of the Panda, and a ball in the way of its elbow that the null space keeps clear of."""
     scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
-    (free,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (1,))
-    elbow = scenario.arm.joint_points(free.q[-1])[3, 0]
-    for shift in np.linspace(0.2, 0.0, 81):
-        ball = Sphere("ball", elbow + np.array([0.0, shift, shift]), 0.05)
+    (free,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (SEED,))
+    before, after = (scenario.arm.joint_points(q)[3, 0] for q in (free.q[0], free.q[-1]))
+    ahead = (after - before) / np.linalg.norm(after - before)
+    for shift in np.linspace(0.2, 0.0, 401):
+        ball = Sphere("ball", after + shift * ahead, 0.05)
         if scenario.arm.clearance(free.q, [ball])[0].min() < -2e-3:
             break
     assert scenario.arm.clearance(free.q[0], [ball])[0] > 2e-3
@@ -43,7 +45,7 @@ def elbow_obstacle():
 def test_a_ball_in_the_way_is_not_touched(name, parameters):
     scenario, ball, free = elbow_obstacle()
     clear = scenario.replace(obstacles=[ball])
-    (episode,) = rollouts(clear, baselines.make(name, clear, **parameters), (1,))
+    (episode,) = rollouts(clear, baselines.make(name, clear, **parameters), (SEED,))
     assert abs(episode.qdot[-1]).max() > 0.0  # not stopped
     assert scenario.arm.clearance(between(episode.q), [ball])[0].min() > 5e-4
     assert not episode.at_limit.any()
@@ -66,21 +68,16 @@ def test_drawn_boxes_are_kept_clear_of():
 
 def test_obstacles_are_those_of_the_observation():
     """Rows of a batch with other obstacles plan otherwise, and each as alone."""
-    scenario, ball, _ = elbow_obstacle()
-    frames = np.tile(np.append(np.eye(3).ravel(), ball.position), (2, 1))
-    frames[1, 9:] += [0.0, 1e-3, 0.0]
-    moving = Sphere("ball", [0.0, 0.0, 0.0], ball.radius, motion=Sampled([0.0, 1.0], frames))
-    shown = scenario.replace(obstacles=[moving])
-    policy = baselines.make("rhc", shown, horizon=200, move_blocks=12, iterations=5)
-    env = ikgym.RedundantIKEnv(shown, preview=policy.preview)
+    box = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.1] * 3, [0.1] * 3, 1, 0.02, 0.1)
+    scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS, obstacles=[box])
+    policy = baselines.make("rhc", scenario, horizon=200, move_blocks=12, iterations=5)
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
     observation, _ = env.reset(seed=1)
-    assert observation["obstacles"].shape == (1, 16)
-    near, far = dict(observation), dict(observation)
-    tool = scenario.arm.forward(observation["q"])[1]
-    near["obstacles"], far["obstacles"] = observation["obstacles"].copy(), observation["obstacles"].copy()
-    near["obstacles"][0, 9:12] = scenario.arm.joint_points(observation["q"])[3, 0] + [0.0, 0.0, 0.14]
-    far["obstacles"][0, 9:12] = tool + [0.0, 0.0, 10.0]
-    alone = [policy.predict(one)[0] for one in (near, far)]
-    assert abs(alone[0] - alone[1]).max() > 1e-4
-    both = {name: np.stack([near[name], far[name]]) for name in near}
+    rows = [observation | {"obstacles": observation["obstacles"].copy()} for _ in range(2)]
+    elbow = scenario.arm.joint_points(observation["q"])[3, 0]
+    rows[0]["obstacles"][0, 9:12] = elbow + np.array([0.0, 0.0, 0.16])
+    rows[1]["obstacles"][0, 9:12] = elbow + np.array([0.0, 0.0, 9.0])
+    alone = [policy.predict(one)[0] for one in rows]
+    assert abs(alone[0] - alone[1]).max() > 1e-5
+    both = {name: np.stack([one[name] for one in rows]) for name in observation}
     np.testing.assert_array_equal(policy.predict(both)[0], np.stack(alone))
