@@ -12,9 +12,10 @@ from gymnasium.utils import seeding
 from baselines.episodes import add_up, play
 from baselines.policy import Memory, SolverPolicy
 from baselines.solvers.receding_horizon.horizon import ProblemData
-from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance, swept
+from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
+from baselines.solvers.surroundings import swept
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from baselines.policy import Problem
 from ikgym.kernels.bodies import PLACED, Shapes, gradient, nearest, place
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.validation import FloatArray
 
 # Most pairs that are looked at, the nearest ones, and the most rows, two for each.
 PAIRS = 12
@@ -22,39 +18,9 @@ AT_END = 1e-9
 LEVER = 0.1
 
 
-class Around(NamedTuple):
-    """Bodies and obstacles, as arrays that a call from Python hands to a kernel.
-
-    Attributes:
-        bodies: See :func:`bodies_block`.
-        boxes: The obstacles of each row, or those of all rows. Shape (B, o, 16) or (1, o, 16).
-    """
-
-    bodies: FloatArray
-    boxes: FloatArray
-
-
-def around(problem: Problem) -> Around:
-    """The bodies of a problem, and the obstacles as they are at the start; none where touching does not matter."""
-    bodies, known = problem.model.bodies, problem.surroundings
-    boxes, checked = bodies.surroundings(()) if known is None else known
-    return Around(bodies_block(bodies.shapes, checked), boxes[None].copy())
-
-
-def bodies_block(shapes: Shapes, checked: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> FloatArray:
-    """:class:`Shapes` and the pairs that are checked as one block of numbers; each array costs a call 0.15 µs.
-
-    Args:
-        shapes: The bodies.
-        checked: Whether a body may not touch an obstacle. Shape (o, k).
-    """
-    counts = [len(shapes.links), len(shapes.pairs), len(checked)]
-    return np.concatenate([counts, *map(np.ravel, shapes), checked.ravel()]).astype(np.float64)
-
-
 @kernel
 def bodies_of(block):
-    """The :class:`Shapes` in a block from :func:`bodies_block`, and the pairs that are checked."""
+    """The :class:`Shapes` in a block of `baselines.solvers.surroundings`, and the pairs that are checked."""
     k, pairs, obstacles = int(block[0]), int(block[1]), int(block[2])
     starts, ends, radii, sizes, two = 3 + k, 3 + 4 * k, 3 + 7 * k, 3 + 8 * k, 3 + 9 * k
     shapes = Shapes(

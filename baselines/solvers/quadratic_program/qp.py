@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from baselines.policy.parameters import parameter
-from baselines.solvers.near_bodies import around
 from baselines.solvers.quadratic_program.among_bodies import AmongBodiesNumbers, qp_step_among
 from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
+from baselines.solvers.surroundings import around
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel

@@ -20,8 +20,6 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
-from baselines.solvers.near_bodies import around
-from baselines.solvers.receding_horizon.newton.bodies import swept
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
 from baselines.solvers.receding_horizon.newton.settings import (
@@ -30,6 +28,7 @@ from baselines.solvers.receding_horizon.newton.settings import (
     PlanSettings,
     plain_settings,
 )
+from baselines.solvers.surroundings import around, swept
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
 from ikgym.validation import FloatArray, flag, number, whole_number

@@ -10,10 +10,11 @@ import numpy as np
 
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.near_bodies import ROWS, around, bodies_of, near_distances, repel
+from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
+from baselines.solvers.surroundings import around
 from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError

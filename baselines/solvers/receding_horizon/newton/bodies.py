@@ -8,11 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE
-from ikgym.arms import Arm
 from ikgym.kernels.bodies import PLACED, Shapes
 from ikgym.kernels.jit import inner
-from ikgym.plant.contact_rows import sweep
-from ikgym.validation import LARGEST
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -96,9 +93,3 @@ def clearance_workspace(clearance, knots, n):
         np.empty((c, BARRIER_SIZE)),
         np.empty(n),
     )
-
-
-def swept(arm: Arm) -> Floats:
-    """How far each joint of an arm moves each body at most within the limits, see :class:`Clearance`. Shape (k, n)."""
-    travel = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
-    return sweep(arm, np.where(arm.prismatic, np.minimum(travel, LARGEST), 0.0), 0.0)
