@@ -48,7 +48,8 @@ def _arm(name: str, tables: dict[str, Any]) -> Arm:
 
 
 def _bodies(like: dict[str, Any], own: dict[str, Any]) -> Bodies:
-    return Bodies(**{key: [*like.get(key, ()), *own.get(key, ())] for key in _fields(like | own)})
+    fields: dict[str, Any] = {key: [*like.get(key, ()), *own.get(key, ())] for key in _fields(like | own)}
+    return Bodies(**fields)
 
 
 def _fields(table: dict[str, Any]) -> dict[str, Any]:
