@@ -58,8 +58,8 @@ def with_bodies(arm: Arm, tree: Tree, base: str, folder: Path | None) -> Arm:
     _report(arm.name, solids, closed)
     if not found:
         return arm
-    names, links, cores = zip(*found, strict=True)
-    starts, ends, radii = map(np.array, zip(*cores, strict=True))
+    names, links, kept = zip(*found, strict=True)
+    starts, ends, radii = map(np.array, zip(*kept, strict=True))
     arm = arm.replace(bodies=Bodies(names, links, starts, ends, radii))
     return arm.replace(bodies=arm.bodies.replace(ignored=_always_touching(arm)))
 

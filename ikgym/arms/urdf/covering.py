@@ -88,8 +88,7 @@ def distances(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatAr
     """Distances of points from a segment in [m]. Shapes (p, 3) and (3,); result (p,)."""
     segment = end - start
     share = np.clip((points - start) @ segment / max(float(segment @ segment), 1e-300), 0.0, 1.0)
-    out: FloatArray = np.linalg.norm(points - start - share[:, None] * segment, axis=1)
-    return out
+    return np.asarray(np.linalg.norm(points - start - share[:, None] * segment, axis=1))
 
 
 def _searched(points: FloatArray, axis: FloatArray) -> FloatArray:
@@ -111,8 +110,7 @@ def _outer(points: FloatArray) -> FloatArray:
     height = np.linspace(-1.0, 1.0, DIRECTIONS)
     turn, width = np.arange(DIRECTIONS) * math.pi * (3.0 - math.sqrt(5.0)), np.sqrt(1.0 - height**2)
     directions = np.column_stack([width * np.cos(turn), width * np.sin(turn), height])
-    outermost: FloatArray = points[np.unique([int(np.argmax(points @ direction)) for direction in directions])]
-    return outermost
+    return np.asarray(points[np.unique([int(np.argmax(points @ direction)) for direction in directions])])
 
 
 def _cost(ends: FloatArray, points: FloatArray) -> float:
