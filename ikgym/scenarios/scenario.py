@@ -220,7 +220,8 @@ class Scenario(Frozen, Reference):
     @property
     def _step_times(self) -> FloatArray:
         """The times of the nominal points after 0, 1, … steps, in [s]. Shape (steps + 1,)."""
-        return self.points() * self.dt
+        times: FloatArray = self.points() * self.dt
+        return times
 
     @property
     def cut_off(self) -> float:

@@ -10,7 +10,6 @@ from ikgym.exceptions import InvalidInputError
 
 def test_an_exact_path_passes_and_each_fault_fails():
     scenario = scenarios.get("cppflow-fetch_arm-hello")
-    positions, quaternions, _ = problems.waypoints("cppflow-fetch_arm-hello")
     nominal = scenario.nominal()[::10]
     q = [scenario.start_of()]
     for row in nominal[1:]:
