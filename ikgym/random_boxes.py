@@ -26,9 +26,9 @@ class RandomBoxes(Obstacle):
     """Upright boxes, drawn in each episode of a scenario whose path comes from a random joint motion.
 
     A box has edges of any length within a range, any angle about the vertical axis, and stands near the motion: it is
-    drawn around a random point of a random body at a random step, and anew until it is near to the arm at that step and
-    the motion is clear of it by the margin, at each step and between the steps. So each episode has a clear motion.
-    Boxes may overlap each other. What the arm does to itself is not looked at.
+    drawn around a random point of a random body at a random step, and drawn anew until it is near to the arm at that
+    step and the motion is clear of it by the margin, at each step and between the steps. So each episode has a clear
+    motion. Boxes may overlap each other. What the arm does to itself is not looked at.
 
     Args:
         name: Its name; the boxes are called `name 1`, `name 2`, …
@@ -56,7 +56,7 @@ class RandomBoxes(Obstacle):
     ignored: Sequence[str] = ()
 
     random: typing.ClassVar[bool] = True
-    motion: typing.ClassVar[None] = None  # type: ignore[misc]  # these do not move
+    motion = None
 
     def __post_init__(self) -> None:
         self._check()

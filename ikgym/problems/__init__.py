@@ -12,9 +12,9 @@ c92e0a45aeee257a9a489b49cf83370193fe5844, whose licences are beside this file: t
 so only the first one is kept. Initial trajectories are those from the first start; `reinforcement` is the published
 network `FREEALL_Task` (`pirl_rl_test_1`). RL-ITG's joint interpolations, which do not follow the paths, are left out.
 
-Problems with obstacles, :data:`OBSTRUCTED`, have upright boxes besides: RL-ITG's `s`, `square` and
+Problems with obstacles, :data:`OBSTRUCTED`, also have upright boxes: of RL-ITG `s`, `square` and
 ``rlitg-obstacle-…``, the first path of each of its hundred scenes `random_obs`; and of CppFlow those of the Panda and
-three of the Fetch, whose starts are drawn clear of the boxes. `tests/problems/write.py` has read them.
+three of the Fetch, whose starts are not published but drawn clear of the boxes. `tests/problems/write.py` read them.
 """
 
 from __future__ import annotations

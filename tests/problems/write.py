@@ -4,8 +4,8 @@
     python -m tests.problems.write RL-ITG cppflow
 
 The commits are those in :mod:`ikgym.problems`. Of the twenty paths of each of RL-ITG's random scenes the first one is
-taken. Of the published starts the first is taken that is clear by the bodies of our arm, if there is one. CppFlow publishes no starts: they are
-drawn here, the clearest of thirty-two. All boxes are upright.
+taken. Of the published starts the first is taken that is clear by the bodies of our arm, if there is one. CppFlow
+publishes no starts: they are drawn here, the clearest of thirty-two. All boxes are upright.
 """
 
 from __future__ import annotations
