@@ -220,8 +220,7 @@ class Scenario(Frozen, Reference):
     @property
     def _step_times(self) -> FloatArray:
         """The times of the nominal points after 0, 1, … steps, in [s]. Shape (steps + 1,)."""
-        times: FloatArray = self.points() * self.dt
-        return times
+        return np.asarray(self.points() * self.dt)
 
     @property
     def cut_off(self) -> float:
