@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import ikgym
 from ikgym.exceptions import InvalidInputError
-from ikgym.random_boxes import RandomBoxes
+from ikgym.obstacles.random_boxes import RandomBoxes
 from tests.comparison import identical
 
 SCENARIO = ikgym.scenarios.get("panda-clutter-random")

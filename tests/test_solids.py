@@ -5,7 +5,7 @@ import pytest
 
 import ikgym
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
-from ikgym.solids import bounded, closest, in_space, link_frames, on_links, outline, solids_of, surface
+from ikgym.obstacles.solids import bounded, closest, in_space, link_frames, on_links, outline, solids_of, surface
 from tests.bodied import AROUND, crowd
 
 #: Half edges and radius, and the volume of the solid in [m³].

@@ -17,8 +17,8 @@ from baselines.policy import Report
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles.solids import closest, solids_of
 from ikgym.scenarios import Preview, Scenario
-from ikgym.solids import closest, solids_of
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
 

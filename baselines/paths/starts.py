@@ -7,9 +7,9 @@ import numpy as np
 from baselines.paths.motion import ideal, in_time, played
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles.solids import closest
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
-from ikgym.solids import closest
 from ikgym.trajectories import RetimedTrajectory
 from ikgym.validation import FloatArray
 

@@ -10,7 +10,7 @@ import numpy as np
 from baselines.viewer.readings import Colour
 from baselines.viewer.replay import Stage, size
 from ikgym.kernels.rotations import quaternion
-from ikgym.solids import Closest, bounded, on_links, surface
+from ikgym.obstacles.solids import Closest, bounded, on_links, surface
 from ikgym.validation import FloatArray
 
 #: Colours (red, green, blue) of obstacles and of the line, and opacities.

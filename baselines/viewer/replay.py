@@ -21,9 +21,9 @@ from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import Surroundings
+from ikgym.obstacles.solids import solids_of
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
-from ikgym.solids import solids_of
 from ikgym.validation import FloatArray, whole_number
 
 # Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
@@ -88,7 +88,7 @@ class Stage:
 
     @functools.cached_property
     def boxes(self) -> FloatArray:
-        """The obstacles after 0, 1, … steps, once if none moves, see :func:`ikgym.solids.solids_of`."""
+        """The obstacles after 0, 1, … steps, once if none moves, see :func:`ikgym.obstacles.solids.solids_of`."""
         scenario = self.scenario
         return solids_of(scenario.obstacles_of(self.seed), scenario.times(scenario.steps + 1), scenario.model)
 

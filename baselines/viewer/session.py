@@ -14,8 +14,8 @@ from baselines.status import Status
 from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
 from baselines.viewer.replay import Stage, play_all
+from ikgym.obstacles.solids import Closest, closest
 from ikgym.scenarios.contacts import pair_names
-from ikgym.solids import Closest, closest
 from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.

@@ -9,8 +9,8 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.kernels.bodies import Surroundings
+from ikgym.obstacles.solids import bounded, closest, in_space, outline
 from ikgym.rendering.style import BLUE, INK
-from ikgym.solids import bounded, closest, in_space, outline
 from ikgym.validation import FloatArray
 
 

@@ -22,7 +22,6 @@ from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import Obstacle
 from ikgym.plant import Plant
-from ikgym.random_boxes import RandomBoxes
 from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
 from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
@@ -39,7 +38,7 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
     Path: PATHS,
     TimeLaw: TIME_LAWS,
     Orientation: ORIENTATIONS,
-    Obstacle: {**OBSTACLES, "random_boxes": RandomBoxes},
+    Obstacle: OBSTACLES,
 }
 PARTS = (Arm, Bodies, Task, TrackingCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.

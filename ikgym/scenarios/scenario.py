@@ -17,10 +17,10 @@ from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE, Surroundings
 from ikgym.kernels.kinematics import Chain, stacked
-from ikgym.obstacles import Obstacle
+from ikgym.obstacles import Obstacle, drawn
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
-from ikgym.scenarios import checks, drawn, durations, files, starts
+from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.reference import Reference
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of

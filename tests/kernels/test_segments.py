@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ikgym.kernels.bodies import Shapes, of_obstacle
-from ikgym.kernels.segments import MEETING
+from ikgym.kernels.bodies.segments import MEETING
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 
 TOLERANCE = 1e-9

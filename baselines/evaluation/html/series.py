@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
-from ikgym.solids import bounded, in_space, surface
+from ikgym.obstacles.solids import bounded, in_space, surface
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.

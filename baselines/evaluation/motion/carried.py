@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.episodes import Seeds
+from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
 from ikgym.scenarios import Scenario
-from ikgym.solids import closest, link_frames, on_links, solids_of
 from ikgym.validation import FloatArray
 
 #: The frame of what does not move.
@@ -19,7 +19,7 @@ AT_REST = np.append(np.eye(3), np.zeros(3))
 def carried(
     scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]
 ) -> dict[str, npt.NDArray[Any]]:
-    """Solids in the frames that carry them, and the closest points; see :mod:`ikgym.solids`.
+    """Solids in the frames that carry them, and the closest points; see :mod:`ikgym.obstacles.solids`.
 
     Args:
         scenario: A scenario with collisions.

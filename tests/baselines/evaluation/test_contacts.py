@@ -17,7 +17,7 @@ from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.records import markdown, records
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
-from ikgym.solids import closest
+from ikgym.obstacles.solids import closest
 from tests.baselines.evaluation.html.test_series import decoded
 from tests.bodied import blocked, crowd
 

@@ -16,7 +16,7 @@ from baselines.paths.survey import branch_of, follows
 from baselines.paths.timing import Timing
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Box
-from ikgym.solids import closest
+from ikgym.obstacles.solids import closest
 from tests.bodied import AROUND, POST, blocked, crowd
 
 

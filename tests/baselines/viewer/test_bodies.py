@@ -5,7 +5,7 @@ import pytest
 
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
-from ikgym.solids import bounded, closest
+from ikgym.obstacles.solids import bounded, closest
 from tests.bodied import blocked, crowd
 
 transforms = pytest.importorskip("viser.transforms")

@@ -9,7 +9,7 @@ import baselines
 import ikgym
 from baselines.episodes import rollouts
 from ikgym.obstacles import Sphere
-from ikgym.random_boxes import RandomBoxes
+from ikgym.obstacles.random_boxes import RandomBoxes
 
 SEED, STEPS = 3, 300
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.scenarios.nominal_frames import NominalFrames
+from ikgym.scenarios.frames.nominal import NominalFrames
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import JointMotions, Trajectory
 from ikgym.validation import FloatArray

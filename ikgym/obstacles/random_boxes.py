@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE
-from ikgym.obstacles import Box, Obstacle
+from ikgym.obstacles.obstacle import Box, Obstacle
 from ikgym.validation import LARGEST, FloatArray, number, whole_number
 
 #: Where boxes are before they are drawn: so far below the base, in [m].
@@ -109,7 +109,7 @@ class RandomBoxes(Obstacle):
         Raises:
             InvalidInputError: There is no room for a box in an episode.
         """
-        from ikgym.kernels.clutter import TRIES, Drawing, draw_boxes  # other scenarios need none of its kernels
+        from ikgym.kernels.bodies.clutter import TRIES, Drawing, draw_boxes  # other scenarios need none of its kernels
 
         out, found = np.empty((len(paths), self.count, OBSTACLE)), np.empty(len(paths), dtype=np.int64)
         checked = arm.bodies.surroundings([self]).checked[0]

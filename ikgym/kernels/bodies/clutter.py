@@ -23,7 +23,7 @@ NUMBERS = 10
 
 
 class Drawing(NamedTuple):
-    """What is drawn, see :class:`ikgym.random_boxes.RandomBoxes`.
+    """What is drawn, see :class:`ikgym.obstacles.random_boxes.RandomBoxes`.
 
     Attributes:
         lower: Of the centres in [m]. Shape (3,).

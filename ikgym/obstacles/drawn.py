@@ -8,8 +8,8 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.kernels.random_numbers import stream
-from ikgym.obstacles import Obstacle
-from ikgym.random_boxes import RandomBoxes
+from ikgym.obstacles.obstacle import Obstacle
+from ikgym.obstacles.random_boxes import RandomBoxes
 from ikgym.trajectories import Trajectory, joint_paths_of
 from ikgym.validation import FloatArray
 

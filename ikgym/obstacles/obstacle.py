@@ -214,10 +214,6 @@ class HalfSpace(Obstacle):
         return _row(towards(normal), self.position, np.full(3, -1.0), 0.0)
 
 
-#: The kinds of obstacles by their names in scenario files.
-KINDS: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "box": Box, "half_space": HalfSpace}
-
-
 def _row(rotation: FloatArray, position: FloatArray, half: FloatArray, radius: float) -> FloatArray:
     return np.concatenate([np.ravel(rotation), position, half, [radius]])
 

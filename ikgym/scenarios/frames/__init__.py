@@ -1,0 +1,1 @@
+"""The nominal frames of N episodes."""
