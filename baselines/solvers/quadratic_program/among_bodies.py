@@ -25,8 +25,8 @@ APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
 # Share of what is missing to the clearance that a step takes back, and share of the acceleration limits that braking
 # reckons with: the joints have a task besides.
 RETREAT, BRAKES = 0.1, 0.5
-# A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of the
-# largest joint velocities and, in [1/s], of the way to a stop that lead away from what is near.
+# A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of
+# the largest joint velocities and, in [1/s], of the way to a stop that lead away from what is near.
 LEVER, AWAY, TO_STOP = 0.05, 0.5, 3.0
 # A row that is met so closely holds the arm back, in [m/s].
 MET = 1e-9
@@ -101,9 +101,9 @@ def aside(factor, weight, gradient, motion):
 def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
-    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and gently,
-    since they have little acceleration for it. What the task itself does, such as to lead the tool to a table, is
-    slowed down as late as braking allows.
+    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and
+    gently, since they have little acceleration for it. What the task itself does, such as to lead the tool to a table,
+    is slowed down as late as braking allows.
 
     Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,
     (d* - d) P ∇d / (∇dᵀ P ∇d) with P = w H⁻¹, weighted by (1 - d / d*)². All of them together make at most a share of

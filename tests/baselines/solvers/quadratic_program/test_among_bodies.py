@@ -55,7 +55,7 @@ def test_without_bodies_nothing_changes():
     assert identical(one.predict(seen)[0], other.predict(seen)[0])
 
 
-BESIDE = Box("box", [0.12, 0.17, 0.62], [0.1, 0.1, 0.1])
+BESIDE = Box("box", [0.12, 0.21, 0.62], [0.1, 0.1, 0.1])
 
 
 def test_keeps_clear_of_a_box_that_comes():
