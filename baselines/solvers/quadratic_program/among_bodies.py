@@ -101,9 +101,9 @@ def aside(factor, weight, gradient, motion):
 def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
-    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What joints can do aside from the task begins early and gently,
-    since they have little acceleration for it. What the task itself does, such as to lead the tool to a table, is
-    slowed down as late as braking allows.
+    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and
+    gently, since they have little acceleration for it. What the task itself does, such as to lead the tool to a table,
+    is slowed down as late as braking allows.
 
     Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,
     (d* - d) P ∇d / (∇dᵀ P ∇d) with P = w H⁻¹, weighted by (1 - d / d*)². All of them together make at most a share of

@@ -72,11 +72,13 @@ class QuadraticProgram(VelocityProgram):
 
     Where bodies matter, each pair of them nearer than d* = `influence` has a row ∇dᵀ q̇ >= −v: a velocity damper
     (Faverjon and Tournassoud 1987). v is the speed from which the pair can still come to rest at `clearance`, with half
-    of the acceleration limits, and at most a quarter of the way to it in one step. Obstacles are where they will be
+    of the acceleration limits, and at most a quarter of the way to it in one step; 10/s of it where the joints can give
+    way without the task. Bodies of the arm are looked at from a third of d* on. Obstacles are where they will be
     after the step. The program is solved by a dual active set, exactly (:func:`row_minimum`). Where no joint velocity
     within the limits has all rows, all v are raised by the same amount, the smallest that will do: the limits of the
-    joints are physical, and hold. z also leads away from what is near (:func:`repel`). Only velocities of the next
-    step are weighed, so that the arm may run into a dead end.
+    joints are physical, and hold. z also leads away from what is near, aside from the task (:func:`keep_clear`), and to
+    the posture the less, the nearer it is. Only velocities of the next step are weighed, so that the arm may run into a
+    dead end.
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.

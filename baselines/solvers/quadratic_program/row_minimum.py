@@ -13,7 +13,7 @@ from ikgym.kernels.linear_algebra import cholesky
 # A normal whose part off the active ones is below this share of it is a combination of them; a constraint that is
 # missed by less, in units of its own normal and relative to 1 or its bound, holds.
 DEPENDENT, ROUNDING = 1e-9, 1e-11
-# Steps for each variable before the search is given up, and the most active constraints that are dropped in one.
+# Steps for each variable before the search is given up.
 MOST = 20
 NONE = -1
 # Weight of the slack of all rows against the squares of the variables: so large that the least slack is found exactly.
@@ -110,9 +110,8 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     size, steps = 0, 0
     entering = _most_missed(lower, upper, rows, bounds, count, x, active, size)
     while entering != NONE and steps < MOST * n:
-        multipliers[size] = 0.0
+        multipliers[size], added = 0.0, False
         _normal(entering, rows, normal)
-        added = False
         while not added and steps < MOST * n:
             steps += 1
             free = _directions(basis, triangle, normal, size, along, step, change)
