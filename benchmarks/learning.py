@@ -1,4 +1,4 @@
-"""Scores of Stable-Baselines3 in the environments by id: ``python -m benchmarks.learning --algorithms ppo``.
+"""Scores of learners in the environments by id: ``python -m benchmarks.learning --algorithms ppo``.
 
 Trains each algorithm in each environment with each seed, a process a core, and plays the last model on episodes of the
 split `test`. ``docs/results/learning_runs.csv`` keeps the curves; a run that stands there with the same settings is not
@@ -27,7 +27,7 @@ from baselines.evaluation.plots import style
 from baselines.evaluation.records import from_csv, to_csv
 from baselines.files import write
 from baselines.training.methods import BY_REWARDS
-from baselines.training.rewards import ALGORITHMS, Training, read
+from baselines.training.rewards import ALGORITHMS, SETTINGS, Training, entries, read
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -46,13 +46,13 @@ class Command:
     """Trains, and writes curves and scores."""
 
     algorithms: tuple[str, ...] = tuple(ALGORITHMS)
-    """Of Stable-Baselines3."""
-    environments: tuple[str, ...] = tuple(rl.IDS)
-    """Their ids."""
+    """Of Stable-Baselines3 and sb3-contrib."""
+    environments: tuple[str, ...] | None = None
+    """Their ids; those that the published settings of the algorithm are for if left out."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """Of the trainings."""
     defaults: bool = False
-    """The defaults of Stable-Baselines3 in place of the published settings."""
+    """The defaults of the library in place of the published settings."""
     workers: int = 2
     """Processes that train at the same time."""
     runs: Path = Path("runs")
@@ -61,7 +61,10 @@ class Command:
     def trainings(self) -> list[Training]:
         """All of them, the first seeds first."""
         minutes, out = MINUTES if self.defaults else None, []
-        for seed, env, algorithm in itertools.product(self.seeds, self.environments, self.algorithms):
+        pairs = list(itertools.product(self.environments or rl.IDS, self.algorithms))
+        if self.environments is None:
+            pairs = [(env, name) for env, name in pairs if env in entries(SETTINGS / f"{name}.yml")]
+        for seed, (env, algorithm) in itertools.product(self.seeds, pairs):
             folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
             out.append(Training(BY_REWARDS[algorithm](env=env, minutes=minutes, defaults=self.defaults), seed, folder))
         return out

@@ -53,12 +53,12 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
     "qp": ("qp", {"gain": 0.3}),
     "dls": ("dls", {"gain": 0.15}),
 }
-#: Learners by their names: the class, the network, and what is observed.
+#: Learners by their names: the algorithm, the network, and what is observed.
 USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
 LEARNERS = {
-    "ppo_shown": ("PPO", "MlpPolicy", USUAL.replace(context=True)),
-    "ppo_history": ("PPO", "MlpPolicy", USUAL.replace(history=4)),
-    "ppo_recurrent": ("RecurrentPPO", "MlpLstmPolicy", USUAL),
+    "ppo_shown": ("ppo", "MlpPolicy", USUAL.replace(context=True)),
+    "ppo_history": ("ppo", "MlpPolicy", USUAL.replace(history=4)),
+    "ppo_recurrent": ("recurrent_ppo", "MlpLstmPolicy", USUAL),
 }
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
@@ -118,8 +118,10 @@ def _solver(name: str) -> Played:
 
 def _learner(name: str, files: Sequence[Path]) -> Played:
     """The models of a learner on the first episodes of each split."""
-    kind, _, task = LEARNERS[name]
-    models, out = [_kind(kind).load(file, device="cpu") for file in files], {}
+    from baselines.training.rewards import ALGORITHMS
+
+    algorithm, _, task = LEARNERS[name]
+    models, out = [ALGORITHMS[algorithm].load(file, device="cpu") for file in files], {}
     for split, (scenario, seeds) in SPLITS.items():
         found = [play(model, task, scenario, ikgym.scenarios.seeds(seeds, EPISODES)) for model in models]
         out[split] = np.array([costs for costs, _ in found]), np.array([away for _, away in found])
@@ -151,25 +153,15 @@ def train(name: str, seed: int, steps: int) -> None:
         return
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
-    kind, network, task = LEARNERS[name]
+    algorithm, network, task = LEARNERS[name]
     settings = {**rewards.read(PPO(env="ikgym/Track-v0")), "policy": network}
-    model = rewards.built(_kind(kind), LearningVecEnv(settings["n_envs"], task), settings, seed)
+    model = rewards.built(rewards.ALGORITHMS[algorithm], LearningVecEnv(settings["n_envs"], task), settings, seed)
     begin = time.process_time()
     model.learn(steps)
     minutes = round((time.process_time() - begin) / 60.0, 1)
     model.save(folder / "model.zip")
     write_json(folder / "run.json", {"minutes": minutes, "steps": model.num_timesteps, "settings": settings})
     print(f"{name}, seed {seed}: {model.num_timesteps} steps in {minutes} min", flush=True)
-
-
-def _kind(name: str) -> Any:
-    import stable_baselines3
-
-    if hasattr(stable_baselines3, name):
-        return getattr(stable_baselines3, name)
-    import sb3_contrib
-
-    return getattr(sb3_contrib, name)
 
 
 def _minutes(files: Sequence[Path]) -> float:

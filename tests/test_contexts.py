@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 
 import ikgym
@@ -64,9 +65,8 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
 
 
 def test_recurrent_learners_remember(tmp_path, monkeypatch):
-    pytest.importorskip("sb3_contrib")
     monkeypatch.setattr(contexts, "RUNS", tmp_path)
     contexts.train("ppo_recurrent", 0, 2048)
-    model = contexts._kind("RecurrentPPO").load(tmp_path / "context-ppo_recurrent" / "seed-0" / "model.zip")
+    model = RecurrentPPO.load(tmp_path / "context-ppo_recurrent" / "seed-0" / "model.zip")
     costs, _ = contexts.play(model, contexts.LEARNERS["ppo_recurrent"][2], "learning-context", SEEDS)
     assert np.isfinite(costs).all()

@@ -6,6 +6,7 @@ from baselines.evaluation.records import from_csv, to_csv
 from baselines.training.rewards import Training, read
 from benchmarks import learning
 from ikgym import rl
+from ikgym.exceptions import UnknownNameError
 
 CURVES = from_csv(learning.CURVES.read_text(encoding="utf-8"))
 PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
@@ -32,6 +33,16 @@ def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
     assert line["score"] >= least
     assert line["seeds"] == 5
     assert line["core_minutes"] <= 10.0
+
+
+def test_algorithms_are_trained_where_settings_are_published():
+    trainings = learning.Command(algorithms=("ppo", "recurrent_ppo"), seeds=(0, 1)).trainings()
+    pairs = [(one.config.env, one.config.method, one.seed) for one in trainings]
+    recurrent = [(env, "recurrent_ppo") for env in ("ikgym/Camera-v0", "ikgym/Payload-v0")]
+    assert set(pairs) == {(*one, seed) for one in [*((env, "ppo") for env in rl.IDS), *recurrent] for seed in (0, 1)}
+    [other] = learning.Command(("recurrent_ppo",), ("ikgym/Track-v0",), seeds=(0,)).trainings()
+    with pytest.raises(UnknownNameError, match="Available: ikgym/Camera-v0, ikgym/Payload-v0"):
+        read(other.config)
 
 
 def test_another_training_replaces_its_lines(tmp_path, monkeypatch):

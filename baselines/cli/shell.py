@@ -29,6 +29,7 @@ CONSOLE = "ikgym"
 EXTRAS = {
     "torch": "train",
     "stable_baselines3": "train",
+    "sb3_contrib": "train",
     "tensorboard": "train",
     "rich": "train",
     "optuna": "train",

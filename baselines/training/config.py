@@ -204,7 +204,7 @@ class APG(Frozen):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rewards(Frozen):
-    """The options of the algorithms of Stable-Baselines3.
+    """The options of the algorithms of Stable-Baselines3 and sb3-contrib.
 
     Raises:
         UnknownNameError: There is no such environment.
@@ -223,7 +223,7 @@ class Rewards(Frozen):
     settings: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.yml")] = None
     """Settings in the format of rl-zoo3; the published ones if left out."""
     defaults: bool = False
-    """Take the defaults of Stable-Baselines3 and one arm in place of settings."""
+    """Take the defaults of the library and one arm in place of settings."""
     validations: Annotated[int, tyro.conf.arg(metavar="N")] = 10
     """Rows of the curve, evenly spaced."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 32
@@ -257,3 +257,10 @@ class TD3(Rewards):
     """Twin delayed DDPG (Fujimoto et al. 2018), by Stable-Baselines3 in an environment by id."""
 
     method: ClassVar[str] = "td3"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RecurrentPPO(Rewards):
+    """PPO with an LSTM, by sb3-contrib in an environment by id; settings for `Camera-v0` and `Payload-v0`."""
+
+    method: ClassVar[str] = "recurrent_ppo"

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
@@ -98,6 +99,8 @@ def _actor(policy: Any) -> tuple[list[nn.Module], str]:
     Raises:
         InvalidInputError: The policy is of another kind.
     """
+    if isinstance(policy, RecurrentActorCriticPolicy):
+        raise InvalidInputError("model: expected one without memory, as agents in files are, got an LSTM.")
     if isinstance(policy, ActorCriticPolicy):
         return [*policy.mlp_extractor.policy_net, policy.action_net], "clip"
     if isinstance(policy, SACPolicy):

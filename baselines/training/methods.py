@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pathlib
 
-from baselines.training.config import APG, PPO, SAC, TD3, Rewards
+from baselines.training.config import APG, PPO, SAC, TD3, RecurrentPPO, Rewards
 from ikgym.exceptions import UnknownNameError
 from ikgym.files import read_user_toml
 
 #: Configurations by the names of their methods; the docstring of each describes the method on the command line.
-BY_REWARDS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3)}
+BY_REWARDS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3, RecurrentPPO)}
 METHODS: dict[str, type[APG | Rewards]] = {APG.method: APG, **BY_REWARDS}
 #: The presets that come with the training, a table each.
 PRESETS = pathlib.Path(__file__).with_name("presets.toml")

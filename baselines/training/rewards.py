@@ -1,4 +1,4 @@
-"""Stable-Baselines3 in the environments by id, with settings in the format of rl-zoo3: thin calls, nothing changed."""
+"""Learning libraries in the environments by id, settings in the format of rl-zoo3: thin calls, nothing changed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 import yaml
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -31,7 +32,7 @@ from ikgym.files import read_user_file
 from ikgym.sb3 import LearningVecEnv
 from ikgym.validation import FloatArray, known_name, whole_number
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "recurrent_ppo": RecurrentPPO}
 #: A file an algorithm, with an entry an environment.
 SETTINGS = pathlib.Path(__file__).parent / "settings"
 #: Settings that may change during a training: ``lin_0.001`` falls linearly from there to 0.
@@ -110,16 +111,25 @@ def read(config: Rewards) -> dict[str, Any]:
     """
     if config.defaults:
         return {"n_timesteps": 1_000_000}
-    file = SETTINGS / f"{config.method}.yml" if config.settings is None else config.settings
-    try:
-        content = yaml.safe_load(read_user_file(file))
-    except yaml.YAMLError as e:
-        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {e}") from e
-    known_name("environment in the settings", config.env, content if isinstance(content, dict) else {})
+    content = entries(SETTINGS / f"{config.method}.yml" if config.settings is None else config.settings)
+    known_name("environment in the settings", config.env, content)
     found = content[config.env]
     if not isinstance(found, dict) or not isinstance(found.get("n_timesteps"), (int, float)):
         raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {found!r}.")
     return dict(found)
+
+
+def entries(file: pathlib.Path) -> dict[str, Any]:
+    """The entries of a file of settings by the ids of their environments.
+
+    Raises:
+        InvalidInputError: The file cannot be read.
+    """
+    try:
+        content = yaml.safe_load(read_user_file(file))
+    except yaml.YAMLError as e:
+        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {e}") from e
+    return content if isinstance(content, dict) else {}
 
 
 def make(config: Rewards, settings: Mapping[str, Any], seed: int = 0) -> BaseAlgorithm:
@@ -142,7 +152,7 @@ def built(kind: type[BaseAlgorithm], envs: LearningVecEnv, settings: Mapping[str
     if parameters.pop("noise_type", None) is not None:
         joints: FloatArray = np.ones(envs.scenario.joints)
         parameters["action_noise"] = NormalActionNoise(0.0 * joints, parameters.pop("noise_std") * joints)
-    policy = parameters.pop("policy", "MlpPolicy")
+    policy = parameters.pop("policy", next(iter(kind.policy_aliases)))
     try:
         return kind(policy, envs, seed=seed, device="cpu", **parameters)
     except (AssertionError, TypeError, ValueError) as e:  # Stable-Baselines3's own checks

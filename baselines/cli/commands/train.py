@@ -93,12 +93,12 @@ def manual() -> str:
     prog, evaluate = _program(), shell.program("evaluate", "python -m baselines.evaluate")
     return f"""\
 Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm in any
-scenario; ppo, sac and td3 are those of Stable-Baselines3, unmodified, in an environment by id. Each method has its own
-options: {prog} METHOD --help
+scenario; ppo, sac and td3 are those of Stable-Baselines3 and recurrent_ppo is that of sb3-contrib, unmodified, in an
+environment by id. Each method has its own options: {prog} METHOD --help
 
 {shell.listing("Methods", methods.METHODS)}
 
-{shell.listing("Environments of ppo, sac, td3", rl.IDS)}
+{shell.listing("Environments by id", rl.IDS)}
 
 {shell.listing("Presets of apg", methods.preset_names())}
 
@@ -112,9 +112,9 @@ Examples:
   {prog} ppo --env ikgym/Track-v0 --minutes 10 --seeds 0 1 2 --out runs/track-ppo
   {prog} sac --env ikgym/Reach-v0 --total-timesteps 100000 --out runs/reach-sac
 
-Files of a run of ppo, sac or td3, in seed-N:
-  model.zip          the model, for Stable-Baselines3
-  agent.safetensors  the agent, for: {evaluate} --policies agent:FILE; none with a history
+Files of a run by rewards, all but apg, in seed-N:
+  model.zip          the model, for its library
+  agent.safetensors  the agent, for: {evaluate} --policies agent:FILE; none with a history or an LSTM
   curve.csv          CPU seconds, steps, and score on validation episodes: 0 standing still, 1 tuned dls
   run.json           at the end: settings, seed and final score
 
@@ -171,7 +171,11 @@ def _require_extra() -> None:
     Raises:
         MissingDependencyError: One is missing.
     """
-    missing = [name for name in ("torch", "stable_baselines3", "tensorboard") if importlib.util.find_spec(name) is None]
+    missing = [
+        name
+        for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
+        if importlib.util.find_spec(name) is None
+    ]
     if missing:
         raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
 

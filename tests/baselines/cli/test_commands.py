@@ -80,9 +80,9 @@ SIZE = "expected 0, or an absolute value from 1e-12 to 1e+12"
         (["oracle", "--knots", "few"], "Error parsing --knots: expected a whole number, got 'few'."),
         (
             ["train", "pop", "--out", "x"],
-            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3,",
+            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3, recurrent_ppo,",
         ),
-        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, or repeat; got --out."),
+        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, recurrent_ppo, or repeat; got --out."),
         (["train", "ppo", "--env", "ikgym/Track-v0"], "Missing from ikgym train ppo: --out."),
         (["train", "ppo", "--out", "x"], "ppo needs an environment: expected --env, one of ikgym/Reach-v0, ikgym/T"),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),

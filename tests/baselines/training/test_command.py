@@ -128,7 +128,7 @@ def test_what_a_trainer_refuses_replaces_no_run(arguments, message, tmp_path, ca
 def test_no_method(capsys):
     assert main([]) == 2
     printed = capsys.readouterr()
-    assert "Methods: apg, ppo, sac, td3." in printed.out
+    assert "Methods: apg, ppo, sac, td3, recurrent_ppo." in printed.out
     assert printed.err.startswith("error: expected a method, one of apg, ppo, ")
 
 

@@ -1,4 +1,4 @@
-"""Training of Stable-Baselines3 in the environments by id, with settings in the format of rl-zoo3."""
+"""Training of Stable-Baselines3 and sb3-contrib in the environments by id, with settings in the format of rl-zoo3."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.noise import NormalActionNoise
@@ -16,16 +17,19 @@ import baselines
 from baselines.cli.commands.train import main
 from baselines.training.methods import METHODS
 from baselines.training.rewards import ALGORITHMS, Training, make, read
+from ikgym import rl
 from ikgym.exceptions import IkgymError
-from ikgym.rl import IDS
 
 TRACK = "ikgym/Track-v0"
 NET = "dict(net_arch=[8, 8])"
+ONLY = {"recurrent_ppo": ("ikgym/Camera-v0", "ikgym/Payload-v0")}
 SMALL = {
     "ppo": f'{{n_envs: 2, n_timesteps: 64, policy: MlpPolicy, n_steps: 16, batch_size: 16, policy_kwargs: "{NET}"}}',
     "sac": f'{{n_envs: 2, n_timesteps: 64, learning_starts: 20, batch_size: 8, policy_kwargs: "{NET}"}}',
     "td3": '{n_envs: 2, n_timesteps: 64, learning_starts: 20, batch_size: 8, noise_type: normal, noise_std: 0.1, '
     "policy_kwargs: {net_arch: [8, 8]}}",
+    "recurrent_ppo": "{n_envs: 2, n_timesteps: 64, policy: MlpLstmPolicy, n_steps: 16, batch_size: 16, "
+    "policy_kwargs: {net_arch: [8, 8], lstm_hidden_size: 8}}",
 }  # fmt: skip
 
 
@@ -42,8 +46,8 @@ def options(algorithm, **changes):
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
-    small = {} if algorithm == "ppo" else {"n_envs": 1, "buffer_size": 10}
-    for env in IDS:
+    small = {"n_envs": 1, "buffer_size": 10} if algorithm in ("sac", "td3") else {}
+    for env in ONLY.get(algorithm, rl.IDS):
         config = options(algorithm, env=env)
         found = read(config)
         assert found["n_timesteps"] > 0
@@ -90,9 +94,11 @@ def test_other_texts_are_refused(setting):
 @pytest.mark.parametrize(("settings", "algorithm"), [(one, one) for one in SMALL], indirect=["settings"])
 def test_the_first_updates_are_those_of_plain_calls(settings, algorithm, tmp_path):
     Training(options(algorithm, settings=settings), 3, tmp_path / "run").run()
-    kind = {"ppo": PPO, "sac": SAC, "td3": TD3}[algorithm]
+    kind = {"ppo": PPO, "sac": SAC, "td3": TD3, "recurrent_ppo": RecurrentPPO}[algorithm]
+    policy, lstm = ("MlpLstmPolicy", {"lstm_hidden_size": 8}) if algorithm == "recurrent_ppo" else ("MlpPolicy", {})
     plain = {
         "ppo": {"n_steps": 16, "batch_size": 16},
+        "recurrent_ppo": {"n_steps": 16, "batch_size": 16},
         "sac": {"learning_starts": 20, "batch_size": 8},
         "td3": {
             "learning_starts": 20,
@@ -101,7 +107,7 @@ def test_the_first_updates_are_those_of_plain_calls(settings, algorithm, tmp_pat
         },
     }[algorithm]
     envs = make_vec_env(TRACK, 2, seed=3)  # as rl-zoo3 makes them
-    theirs = kind("MlpPolicy", envs, seed=3, device="cpu", policy_kwargs={"net_arch": [8, 8]}, **plain)
+    theirs = kind(policy, envs, seed=3, device="cpu", policy_kwargs={"net_arch": [8, 8], **lstm}, **plain)
     before = {name: value.clone() for name, value in theirs.policy.state_dict().items()}
     theirs.learn(64)
     ours = kind.load(tmp_path / "run" / "model.zip", device="cpu")
@@ -141,6 +147,27 @@ def test_environments_with_a_history_have_no_agent_and_say_why(tmp_path):
     about = Training(options("ppo", env=env, settings=file), 0, tmp_path / "run").run()
     assert about["agent"].startswith("none: model: expected a network from 38 features to 7 outputs, got 272")
     assert not (tmp_path / "run" / "agent.safetensors").exists()
+
+
+@pytest.mark.parametrize("settings", ["recurrent_ppo"], indirect=True)
+def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
+    about = Training(options("recurrent_ppo", settings=settings), 0, tmp_path / "run").run()
+    assert about["agent"] == "none: model: expected one without memory, as agents in files are, got an LSTM."
+    assert not (tmp_path / "run" / "agent.safetensors").exists()
+    model = RecurrentPPO.load(tmp_path / "run" / "model.zip", device="cpu")
+
+    class Forgetful:
+        def predict(self, observation, state=None, episode_start=None, deterministic=False):
+            return model.predict(observation, deterministic=deterministic)
+
+    one, other = (rl.costs(player, TRACK, episodes=2) for player in (model, Forgetful()))
+    assert rl.score({TRACK: [one]}, "validation")[TRACK].mean == about["validation_score"]
+    assert (one != other).all()
+
+
+def test_the_defaults_of_the_library_are_those_of_its_policy_with_memory():
+    model = make(options("recurrent_ppo", defaults=True), {"n_timesteps": 64})
+    assert (model.n_envs, model.n_steps, model.policy.lstm_hidden_state_shape) == (1, 128, (1, 1, 256))
 
 
 @pytest.mark.parametrize("settings", ["td3"], indirect=True)
