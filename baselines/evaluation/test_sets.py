@@ -71,7 +71,7 @@ SETS = {
         TestSet("panda-same-arm", episodes=65, digest="bc8dd757d74b", noise_seeds=3, sequence=5),
         TestSet("panda-payload", episodes=64, digest="1dcbd797b41b"),
         TestSet("panda-bus", episodes=64, digest="700b8d28bf95"),
-        TestSet("panda-clutter-random", episodes=128, digest="99889221b001"),
+        TestSet("panda-clutter-random", episodes=128, digest="068a39191fc3"),
         TestSet("panda-field", episodes=64, digest="3f19a2c4b072", noise_seeds=3),
     )
 }
