@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import gymnasium
 
 #: Characters of a name that messages show at most.
 SHOWN = 200
+#: Of more names than that, messages list the first ones.
+MANY, FIRST = 200, 20
 
 
 class IkgymError(Exception):
@@ -19,6 +21,13 @@ class InvalidInputError(IkgymError, ValueError):
     """A value has a wrong shape, type, range or form."""
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names for a message; of a great many, the first ones."""
+    if len(names) <= MANY:
+        return ", ".join(names)
+    return f"{', '.join(names[:FIRST])}, … ({len(names)} in all)"
+
+
 class UnknownNameError(IkgymError, LookupError):
     """A name is in no registry; the message lists the available names and the nearest match."""
 
@@ -26,7 +35,7 @@ class UnknownNameError(IkgymError, LookupError):
         self.kind, self.name, self.available = kind, name, tuple(available)
         near = difflib.get_close_matches(name, self.available, n=1, cutoff=0.5) if isinstance(name, str) else ()
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        listing = ", ".join(self.available) or "none"
+        listing = listed(self.available) or "none"
         shown = " ".join(repr(name).split())  # arrays take several lines
         shown = shown if len(shown) <= SHOWN else f"{shown[: SHOWN - 1]}…"
         super().__init__(f"There is no {kind} {shown}.{hint} Available: {listing}.")

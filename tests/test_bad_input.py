@@ -15,7 +15,7 @@ import ikgym.sb3
 from ikgym.arms.bodies import MOST_BODIES, Bodies
 from ikgym.exceptions import IkgymError
 from ikgym.obstacles import KINDS as OBSTACLES
-from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from ikgym.obstacles import Box, Capsule, HalfSpace, RandomBoxes, Sphere
 from ikgym.plant import Plant
 from ikgym.scenarios.checks import MOST_OBSTACLES
 from ikgym.trajectories import (
@@ -59,6 +59,7 @@ GOOD = (
     Capsule("capsule", [1, 0, 0], [1, 0, 1], 0.1, HELIX, ("hand",)),
     Box("box", [1, 0, 0], [0.1, 0.2, 0.3], np.eye(3), HELIX, ("hand",)),
     HalfSpace("floor", [0, 0, 0], [0, 0, 1], HELIX, ("hand",)),
+    RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2, 0.2], ignored=("hand",)),
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
     Plant(zero=1e-3, bandwidth=10.0, command_delay=2, arms=(ARM,)),

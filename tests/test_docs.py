@@ -95,6 +95,20 @@ def test_scenarios_snippets_run(tmp_path, monkeypatch):
     assert names["driven"].duration == names["found"].duration
 
 
+def test_snippets_on_bodies_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    (snippet,) = snippets_of("bodies.md")
+    exec(snippet, names)
+    read = ikgym.scenarios.load("mine.toml")
+    assert 0.0 < names["distance"] < 0.2
+    assert [one.name for one in read.obstacles] == ["table", "wall"]
+    assert read.arm.bodies.names == names["arm"].bodies.names
+    (obstacle,) = re.findall(r"```toml\n(.*?)```", (PAGES / "bodies.md").read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "other.toml").write_text(f'name = "other"\nlike = "panda-circle"\n{obstacle}')
+    assert ikgym.scenarios.load("other.toml").obstacles[0].size.tolist() == [1.0, 1.0, 0.1]
+
+
 @pytest.mark.slow
 def test_snippets_on_agents_run(tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
@@ -113,7 +127,7 @@ def test_snippets_on_papers_run(paper, capsys):
 
 
 def test_no_page_has_snippets_that_nobody_runs():
-    here = {"README.md", "evaluation.md", "policies.md", "real-arm.md", "scenarios.md", "agents.md"}
+    here = {"README.md", "evaluation.md", "policies.md", "real-arm.md", "scenarios.md", "agents.md", "bodies.md"}
     run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in here), *(PAGES / "papers").glob("*.md")}
     with_snippets = {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")}
     assert with_snippets <= run

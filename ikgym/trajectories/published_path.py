@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym import problems
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, listed
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, shortened
@@ -89,7 +89,7 @@ class RandomPublishedPath(Trajectory):
         if not members or not all(len(problems.waypoints(name).starts) for name in members):
             raise InvalidInputError(
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
-                f"available: {', '.join(problems.names())}."
+                f"available: {listed(problems.names())}."
             )
         self._settle(period=number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
 

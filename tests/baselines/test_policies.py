@@ -237,13 +237,17 @@ def test_only_those_with_a_tolerance_say_that_they_have_converged(name):
         assert policy.report(state).status[0] > Status.CONVERGED
 
 
+#: What a policy is told of a scenario.
+PROBLEM = {"model", "task", "cost", "dt", "velocity_limit", "surroundings", "obstacles_shown"}
+
+
 @pytest.mark.parametrize("on", ["varga7-fast", "khan8-q7q8", "panda-circle"])
 @every_contender
 def test_a_policy_is_told_the_model_and_never_the_arm(name, on):
     policy = policy_for.__wrapped__(name, on)  # a new one: what it compiles when it is asked is a maze of numba's
     if policy is None:
         return
-    assert {f.name for f in dataclasses.fields(Problem)} == {"model", "task", "cost", "dt", "velocity_limit"}
+    assert {f.name for f in dataclasses.fields(Problem)} == PROBLEM
     assert policy.problem.model is scenario(on).model
     for thing in reachable(policy):
         assert not isinstance(thing, (ikgym.Scenario, gym.Env, gym.vector.VectorEnv, Simulator))

@@ -101,7 +101,8 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
 
     Args:
         scenarios: Names of scenarios.
-        test_sets: Names of test sets. If neither these nor scenarios are given: all fixed scenarios and all sets.
+        test_sets: Names of test sets. If neither these nor scenarios are given: all fixed scenarios and all sets but
+            those with collisions, in which a search takes minutes an episode.
         seeds: Reset seeds of the random scenarios.
 
     Raises:
@@ -120,8 +121,8 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         whole_number("seeds", seed, at_least=0)
     if not (scenarios or test_sets):
         every = map(scenario_registry.get, scenario_registry.names())
-        named = [scenario for scenario in every if not _drawn(scenario)]
-        test_sets = known_sets.names()
+        named = [scenario for scenario in every if not (_drawn(scenario) or scenario.collides)]
+        test_sets = [name for name in known_sets.names() if not known_sets.get(name).scenario.collides]
     out = [(scenario, Seeds(seed)) for scenario in named for seed in (seeds if _drawn(scenario) else (0,))]
     for one in map(known_sets.get, test_sets):
         out += [(one.scenario, Seeds(seed, one.arm_seed(seed))) for seed in one.seeds]

@@ -433,8 +433,9 @@ class TestCommandLine:
 
     def test_all_fixed_scenarios_and_frozen_sets_if_nothing_is_named(self):
         todo = {(scenario.name, draw.seed) for scenario, draw in optimum_command.episodes((), (), ())}
-        fixed = {(name, 0) for name in ikgym.scenarios.names() if not ikgym.scenarios.get(name).random}
-        sets = test_sets.SETS.values()
+        every = [ikgym.scenarios.get(name) for name in ikgym.scenarios.names()]
+        fixed = {(one.name, 0) for one in every if not (one.random or one.collides)}
+        sets = [one for one in map(test_sets.get, test_sets.names()) if not one.scenario.collides]
         assert len(sets) == 14
         assert todo == fixed | {(one.name, seed) for one in sets for seed in one.seeds}
 
