@@ -32,7 +32,7 @@ def test_a_worst_episode_that_costs_too_much_is_refused(change):
 @pytest.mark.parametrize("name", every_scenario())
 def test_no_step_costs_more_than_the_bound(name):
     """From the farthest start, at full speed: the bound is true, and within 12 decades of what happens."""
-    scenario = scenarios.get(name).replace(steps=30, iterations_per_point=1, dt=0.3)
+    scenario = scenarios.get(name).replace(steps=30, iterations_per_point=1, dt=0.3, obstacles=(), collisions=False)
     bound, env, worst = scenario.largest_step_cost(), ikgym.RedundantIKEnv(scenario), 0.0
     for sign in (-1.0, 1.0):
         start = np.clip(sign * scenario.start_bound(), scenario.arm.lower, scenario.arm.upper)
