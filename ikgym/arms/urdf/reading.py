@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.arms.arm import Arm, UrdfReference
+from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
 from ikgym.arms.urdf.bodies import with_bodies
 from ikgym.arms.urdf.chain import read_chain
