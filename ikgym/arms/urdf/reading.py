@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
+from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
 from ikgym.arms.urdf.chain import read_chain
 from ikgym.arms.urdf.joint import MOVING, UrdfJoint
