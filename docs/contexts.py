@@ -20,8 +20,8 @@ import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import lost
 from baselines.evaluation.records import from_csv
-from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write_json
+from baselines.statistics import geometric_interval, geometric_mean
 from baselines.training.config import PPO
 from ikgym.rl import Task, scoring
 from ikgym.validation import BoolArray, FloatArray

@@ -31,9 +31,9 @@ from baselines.episodes import rollouts
 from baselines.evaluate import evaluate
 from baselines.evaluation.plots.comparison import front
 from baselines.evaluation.records import from_csv, records, to_csv
-from baselines.evaluation.summary import geometric_interval, geometric_mean
 from baselines.files import write
 from baselines.oracle import best_known
+from baselines.statistics import geometric_interval, geometric_mean
 from docs import contexts
 
 RESULTS = Path(__file__).parent / "results"

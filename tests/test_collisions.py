@@ -9,6 +9,7 @@ import ikgym
 from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from ikgym.obstacles.solids import link_frames
 from ikgym.plant import Plant
 from ikgym.trajectories import StraightLine
 
@@ -68,13 +69,8 @@ class Judge:
 
     def frames(self, q):
         """The frames of the links, the base first."""
-        rotation, position, out = np.eye(3), np.zeros(3), [coal.Transform3s()]
-        for offset, axis, angle in zip(self.arm.offsets, self.arm.axes, q, strict=True):
-            position = position + rotation @ offset
-            skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-            rotation = rotation @ (np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew)
-            out.append(coal.Transform3s(rotation, position))
-        return out
+        frames = link_frames(self.arm, q[None])[0]
+        return [coal.Transform3s(one[:9].reshape(3, 3), one[9:]) for one in frames]
 
     def __call__(self, q):
         frames = self.frames(q)

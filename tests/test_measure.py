@@ -7,7 +7,7 @@ import pytest
 from baselines import registry
 from baselines.evaluation.records import from_csv
 from baselines.spec import parse_policy
-from baselines.tuning import RANGES, read
+from baselines.tuning.ranges import RANGES, read
 from docs import measure
 
 POSE = from_csv((measure.RESULTS / "pose.csv").read_text(encoding="utf-8"))

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Episode, Seeds
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
 from baselines.evaluation.motion.carried import carried
 from baselines.evaluation.motion.played import by_joint
+from baselines.recording import Episode, Seeds
 from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names

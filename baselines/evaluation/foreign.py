@@ -12,8 +12,9 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Episode, Seeds, Tick, check_finite
+from baselines.episodes import Tick, check_finite
 from baselines.policy import Report
+from baselines.recording import Episode, Seeds
 from baselines.status import Status
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError

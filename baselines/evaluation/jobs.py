@@ -10,9 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import tyro
 
-from baselines.episodes import Policy, Seeds
-from baselines.evaluation import metrics
-from baselines.evaluation import test_sets as known_sets
+from baselines.evaluation import metrics, test_sets
 from baselines.evaluation.export import formats
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.policies import ALL, specifications
@@ -20,6 +18,8 @@ from baselines.evaluation.specification import Specification, shown_preview
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
+from baselines.policy.protocol import Policy
+from baselines.recording import Seeds
 from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
@@ -256,7 +256,7 @@ def _episodes(options: Options) -> list[_Episodes]:
                 f"A test set defines what is played: with {', '.join(map(repr, options.test_sets))}, expected no "
                 "scenarios, episodes, split, steps or noise_seeds."
             )
-        sets = [known_sets.get(name) for name in options.test_sets]
+        sets = [test_sets.get(name) for name in options.test_sets]
         return [_drawn(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
     reset = scenario_registry.seeds(options.split, options.episodes)
     return [
@@ -265,7 +265,7 @@ def _episodes(options: Options) -> list[_Episodes]:
             # A scenario that is the same at every reset is played once.
             reset if scenario.random or scenario.plant.random else (0,),
             options.noise_seeds,
-            length=known_sets.sequence(scenario.name),
+            length=test_sets.sequence(scenario.name),
         )
         for scenario in listed
     ]

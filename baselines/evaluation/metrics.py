@@ -16,9 +16,9 @@ import numpy as np
 
 import ikgym
 from baselines.canonical import canonical
-from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.motion.contacts import contacts
 from baselines.evaluation.motion.free_timing import first_steps, path_scores
+from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits

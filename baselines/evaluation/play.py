@@ -18,7 +18,7 @@ from tqdm.contrib.logging import logging_redirect_tqdm
 
 import ikgym
 from baselines.canonical import canonical, jsonable
-from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts, sequences
+from baselines.episodes import Tick, rollouts, sequences
 from baselines.evaluation.foreign import ForeignPolicy, play_wrapped
 from baselines.evaluation.jobs import Job
 from baselines.evaluation.metrics import Row, describe, measure
@@ -27,6 +27,8 @@ from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MEANINGLESS
+from baselines.policy.protocol import Policy
+from baselines.recording import Episode, Seeds
 from baselines.workers import TOLERANCE, WorkerError, Workers, finished
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import logger

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from baselines import registry
-from baselines.episodes import Policy, Seeds
 from baselines.evaluation.foreign import Predictor, Wrap
 from baselines.evaluation.specification import (
     ObjectSpecification,
@@ -18,6 +17,8 @@ from baselines.evaluation.specification import (
     shown_preview,
 )
 from baselines.policy import SolverPolicy
+from baselines.policy.protocol import Policy
+from baselines.recording import Seeds
 from baselines.spec import PolicySpec, parse_place, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario

@@ -17,10 +17,11 @@ import numpy as np
 from baselines import registry
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.summary import Summary, by_seed, geometric_interval, geometric_mean, summarise
+from baselines.evaluation.summary import Summary, by_seed, summarise
 from baselines.evaluation.table import NOTHING, code, escaped, grid, number
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
+from baselines.statistics import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray

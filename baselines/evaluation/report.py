@@ -12,9 +12,10 @@ from urllib.parse import quote
 from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, LOST_ORIENTATION, LOST_POSITION, Row
-from baselines.evaluation.summary import Paired, Spread, Summary, by_scenario, is_reference, summarise
+from baselines.evaluation.summary import Paired, Summary, by_scenario, is_reference, summarise
 from baselines.evaluation.table import NOTHING, Column, code, escaped, filled, fitting, markdown, number, plain
 from baselines.oracle import best_known
+from baselines.statistics import Spread
 
 #: Characters that a line of the printed tables may have.
 WIDTH = 120

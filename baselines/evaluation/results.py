@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 import ikgym
 from baselines.canonical import canonical
-from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
@@ -32,6 +31,7 @@ from baselines.files import (
     write,
     write_json,
 )
+from baselines.recording import Episode
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest

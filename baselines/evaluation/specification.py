@@ -10,10 +10,11 @@ from typing import Any, cast
 
 from baselines import registry
 from baselines.canonical import jsonable
-from baselines.episodes import Policy, Seeds
 from baselines.evaluation.foreign import ForeignPolicy, Predictor, Wrap
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
+from baselines.policy.protocol import Policy
+from baselines.recording import Seeds
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import offsets

@@ -1,4 +1,4 @@
-"""The episodes of a policy in a scenario put together: geometric means, bootstrap intervals, worst cases, labels."""
+"""The episodes of a policy in a scenario put together: costs, comparisons with the ideal plant, labels."""
 
 from __future__ import annotations
 
@@ -8,68 +8,15 @@ import functools
 import math
 import operator
 import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, Self
-
-import numpy as np
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
 
 from baselines import registry
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
+from baselines.statistics import Spread, geometric_interval, geometric_mean
 from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError
-from ikgym.validation import FloatArray
-
-#: Number of bootstrap resamples.
-RESAMPLES = 9999
-
-
-def geometric_mean(values: Sequence[float] | FloatArray) -> float:
-    """Exponential of the mean logarithm; 0 if a value is 0."""
-    numbers = np.ravel(values).tolist()
-    if min(numbers) <= 0.0:
-        return 0.0
-    return float(numbers[0]) if len(numbers) == 1 else math.exp(math.fsum(map(math.log, numbers)) / len(numbers))
-
-
-def geometric_interval(values: Sequence[float] | FloatArray) -> tuple[float, float]:
-    """The 95 % percentile-bootstrap interval of a geometric mean.
-
-    Each resample draws training seeds and episodes with replacement. All seeds share the drawn episodes, because every
-    seed plays the same ones: an episode that is hard is hard for all of them, and drawing anew for each seed would
-    make the interval too narrow. With one seed, episodes alone are resampled. The draws are always the same.
-
-    Args:
-        values: Positive numbers, one row per training seed, one column per episode. Shape (s, e) or (e,).
-
-    Returns:
-        The 2.5th and the 97.5th percentile.
-    """
-    logs = np.log(np.atleast_2d(values))
-    seeds, episodes = logs.shape
-    generator = np.random.default_rng(0)
-    drawn = generator.integers(episodes, size=(RESAMPLES, episodes))
-    means = np.stack([row[drawn].mean(axis=1) for row in logs], axis=1)
-    rows = generator.integers(seeds, size=(RESAMPLES, seeds))
-    low, high = np.exp(np.percentile(np.take_along_axis(means, rows, axis=1).mean(axis=1), (2.5, 97.5)))
-    return float(low), float(high)
-
-
-class Spread(NamedTuple):
-    """Geometric mean, median, 90th percentile and maximum of a number over episodes, and the seed of the maximum."""
-
-    mean: float
-    median: float
-    p90: float
-    worst: float
-    worst_seed: int
-
-    @classmethod
-    def of(cls, values: Mapping[int, float]) -> Self:
-        """The spread of numbers by their reset seeds."""
-        numbers, seed = list(values.values()), max(values, key=lambda seed: values[seed])
-        p90 = float(np.percentile(numbers, 90))
-        return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)
 
 
 class Paired(NamedTuple):

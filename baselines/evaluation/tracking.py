@@ -12,7 +12,6 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
@@ -22,6 +21,7 @@ from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy, bind
 from baselines.files import write
+from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym import scenarios
 from ikgym.scenarios import Preview, Scenario

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.episodes import add_up, play
+from baselines.episodes import play
 from baselines.policy import Memory, SolverPolicy
+from baselines.recording import add_up
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid

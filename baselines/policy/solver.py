@@ -1,7 +1,4 @@
-"""A solver as a policy: the signature of Stable-Baselines3's `predict`, and memory that travels through `state`.
-
-One file, although long: it is the whole path of a `predict`, from its arguments to its answer.
-"""
+"""A solver as a policy: the signature of Stable-Baselines3's `predict`, and memory that travels through `state`."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import abc
 import contextlib
 import dataclasses
 import functools
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar, Self
 
@@ -24,7 +20,6 @@ from baselines.policy.arguments import (
     Signature,
     as_batch,
     checked_memory,
-    joined,
     not_finite,
     pack,
     remembered,
@@ -35,20 +30,16 @@ from baselines.policy.arguments import (
 )
 from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
+from baselines.policy.sharing import divided, undivided
 from baselines.policy_kernels import all_finite, cut_rows
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
-from ikgym.parallel import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray, Frozen
 
 #: Policies that have solved something in this process, and calls of kernels that have been made: they are compiled.
 compiled_classes: set[Any] = set()
-
-#: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
-#: wait for others of it wait forever.
-_sharing = threading.local()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -274,7 +265,7 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def _undivided(self, rows: int) -> bool:
         """Whether so many rows are solved in one call, not by several threads."""
-        return rows < 2 * self.grain or getattr(_sharing, "now", False)
+        return undivided(rows, self.grain)
 
     @classmethod
     @contextlib.contextmanager
@@ -298,15 +289,8 @@ class SolverPolicy(Frozen, abc.ABC):
                 return self.solve(batch, memory)
         if self._undivided(rows):
             return self.solve(batch, memory)
-        parts: dict[int, Solution] = {}
 
-        def work(start: int, stop: int) -> None:
-            share = taken(batch, slice(start, stop))
-            _sharing.now = True
-            try:
-                parts[start] = self.solve(share, self._named(tuple(array[start:stop] for array in memory)))
-            finally:
-                _sharing.now = False
+        def share(part: slice) -> Solution:
+            return self.solve(taken(batch, part), self._named(tuple(array[part] for array in memory)))
 
-        in_chunks(work, rows, self.grain)
-        return joined([parts[start] for start in sorted(parts)])
+        return divided(share, rows, self.grain)

@@ -18,13 +18,14 @@ import numpy.typing as npt
 from baselines import registry
 from baselines.agents.files import AgentFile
 from baselines.agents.policy import Agent
-from baselines.episodes import add_up, play, rollouts
+from baselines.episodes import play, rollouts
 from baselines.evaluation.metrics import lost
-from baselines.evaluation.summary import geometric_mean
 from baselines.files import write
 from baselines.fingerprints import fingerprint
 from baselines.policy import Problem
+from baselines.recording import add_up
 from baselines.spec import parse_policy
+from baselines.statistics import geometric_mean
 from ikgym import scenarios, tasks
 from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome

@@ -14,8 +14,8 @@ from gymnasium.utils import seeding
 from tqdm import tqdm
 
 import baselines
-from baselines.episodes import Seeds
 from baselines.evaluation.policies import bind
+from baselines.recording import Seeds
 from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN

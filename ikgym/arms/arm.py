@@ -5,38 +5,17 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms import checks
 from ikgym.arms.bodies import Bodies, Neighbour
+from ikgym.arms.source import UrdfReference
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import kinematics
 from ikgym.kernels.kinematics import Chain
 from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix, shortened
-
-
-class UrdfReference(NamedTuple):
-    """The source of an arm from a URDF file; see :func:`ikgym.arms.from_urdf`.
-
-    Attributes:
-        file: The file, as an absolute path.
-        base: The link at its beginning, None for the root.
-        tip: The link at its end, None for the only leaf.
-        tool: Tool point in the frame of the tip in [m], None for its origin. Shape (3,).
-        tool_rotation: Orientation of the tool in the frame of the tip, None for that frame's. Shape (3, 3).
-        meshes: Whether collision meshes were opened.
-    """
-
-    file: Path
-    base: str | None
-    tip: str | None
-    tool: FloatArray | None
-    tool_rotation: FloatArray | None
-    meshes: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baselines import tuning
 from baselines.agents.files import load_agent
 from baselines.agents.track import Track
 from baselines.evaluation.results import read_rows
 from baselines.solvers.rivals.model_files import urdf
 from baselines.training.methods import configure
+from baselines.tuning import ranges
 from ikgym import arms, scenarios
 from ikgym.exceptions import IkgymError
 from ikgym.trajectories import from_csv
@@ -44,7 +44,7 @@ TIMELESS = b"x,y,z\n1,2,3\n4,5.5,6\n7,8,9e-1\n"
 READERS = {
     "scenario.toml": scenarios.load,
     "preset.toml": lambda file: configure(str(file)),
-    "ranges.toml": tuning.read,
+    "ranges.toml": ranges.read,
     "points.csv": from_csv,
     "arm.urdf": arms.from_urdf,
     "it.safetensors": lambda file: load_agent(file, (Track,)),

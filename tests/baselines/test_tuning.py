@@ -17,7 +17,9 @@ from baselines import registry, tuning
 from baselines.cli.commands.tune import main
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
-from baselines.tuning import JOURNAL, RANGES, Search
+from baselines.tuning import Search
+from baselines.tuning.ranges import RANGES, of, read, suggested
+from baselines.tuning.trials import DONE, JOURNAL, _study
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
@@ -54,7 +56,7 @@ def run(folder, trials=8, episodes=20, *, resume=False, overwrite=False, workers
     (search,) = tuning.searches(SHORT, ["dls"], episodes=episodes, seed=seed)
     folder.mkdir(exist_ok=True)
     (found,) = tuning.run(folder, [search], trials, workers=workers, resume=resume, overwrite=overwrite)
-    done = tuning._study(folder / JOURNAL, search).get_trials(states=tuning.DONE)
+    done = _study(folder / JOURNAL, search).get_trials(states=DONE)
     return found, [(one.user_attrs["settings"], one.value, one.state.name, one.last_step) for one in done]
 
 
@@ -118,12 +120,12 @@ def test_a_killed_command_is_resumed_by_several_workers(tmp_path, plays):
 
 
 def test_settings_of_all_ranges_make_a_solver_that_looks_no_further():
-    ranges = tuning.read(RANGES)
+    ranges = read(RANGES)
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     for one in tuning.searches(scenarios.get("varga7-random")):
         ahead = one.make({}).preview
         for _ in range(8):
-            settings = tuning.suggested(study.ask(), one.ranges, parse_policy(one.spec)[1])
+            settings = suggested(study.ask(), one.ranges, parse_policy(one.spec)[1])
             assert settings
             assert one.make(settings).preview == ahead
     left_out = {*ranges} - {one.spec for one in tuning.searches(scenarios.get("varga7-pose-random"))}
@@ -138,13 +140,13 @@ def test_parameters_within_another_and_under_a_condition():
     }
     study, seen = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0)), set()
     for _ in range(20):
-        found = tuning.suggested(study.ask(), ranges, {"options": {"horizon": 3}})
+        found = suggested(study.ask(), ranges, {"options": {"horizon": 3}})
         assert found["options"]["horizon"] == 3
         assert 0.1 <= found["options"]["gain"] <= 0.2
         assert ("x" in found) == (found["rule"] == "a")
         seen.add(found.get("x"))
     assert seen == {None, 1, 2, 3}
-    assert list(tuning.of("dls:gain=0.5", tuning.read(RANGES))) == ["damping"]
+    assert list(of("dls:gain=0.5", read(RANGES))) == ["damping"]
 
 
 @pytest.mark.parametrize(

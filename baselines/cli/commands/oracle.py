@@ -13,7 +13,6 @@ from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.cli.parsing import Rule, parse
-from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
@@ -22,6 +21,7 @@ from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.several import Wanted, check_policies, find_all
 from baselines.oracle.stripped import NOTE, stripped, strips
+from baselines.recording import Seeds
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError

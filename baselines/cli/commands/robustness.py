@@ -14,7 +14,6 @@ from tqdm import tqdm
 from baselines.cli import shell
 from baselines.cli.commands.evaluate import ONE_KIND
 from baselines.cli.parsing import if_random
-from baselines.episodes import Seeds
 from baselines.evaluation import records
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.results import Rows
@@ -22,6 +21,7 @@ from baselines.evaluation.run import evaluate
 from baselines.files import write
 from baselines.oracle import Search
 from baselines.oracle.several import Wanted, find_all
+from baselines.recording import Seeds
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario, imperfect

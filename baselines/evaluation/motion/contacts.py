@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.episodes import Episode
+from baselines.recording import Episode
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
 

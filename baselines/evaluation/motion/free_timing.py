@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts
+from baselines.episodes import Tick, rollouts
+from baselines.policy.protocol import Policy
+from baselines.recording import Episode, Seeds
 from ikgym.kernels.simulation import nominal_rows
 from ikgym.kernels.tasks import AXIS, POSE
 from ikgym.scenarios import Preview, Scenario

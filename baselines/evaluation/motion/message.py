@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from baselines.episodes import Episode, Seeds
 from baselines.evaluation.motion.played import Motion
 from baselines.evaluation.motion.spline import smooth
 from baselines.evaluation.motion.stop import stopped
+from baselines.recording import Episode, Seeds
 from ikgym.scenarios import Scenario
 
 KIND = "trajectory_msgs/msg/JointTrajectory"

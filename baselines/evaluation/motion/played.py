@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.episodes import Episode, Seeds
+from baselines.recording import Episode, Seeds
 from ikgym.arms import Arm
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray

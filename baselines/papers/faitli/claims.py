@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import SAME, YANK, extent, rms, sign_changes
 from baselines.papers.faitli.episodes import (
     REGULAR,
@@ -27,6 +26,7 @@ from baselines.papers.faitli.episodes import (
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import FAST, SLOW, nominal_angles
+from baselines.recording import Episode
 from baselines.registry import make
 from baselines.status import Status
 from ikgym.validation import FloatArray

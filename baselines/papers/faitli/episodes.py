@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import sign_changes
 from baselines.papers.runs import Runs
+from baselines.recording import Episode
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import StraightLine

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import CONSIDERABLY, above, larger, rms
 from baselines.papers.paper import Figures, Finding, scaled
 from baselines.papers.runs import Runs
@@ -33,6 +32,7 @@ from baselines.papers.varga.episodes import (
     without_start,
 )
 from baselines.papers.varga.interpreted import descend
+from baselines.recording import Episode
 from ikgym.validation import FloatArray
 
 

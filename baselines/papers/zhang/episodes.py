@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.runs import Runs
 from baselines.policy import Batch
+from baselines.recording import Episode
 from baselines.registry import make
 from baselines.solvers.levenberg_marquardt.base import DampingMemory
 from baselines.solvers.levenberg_marquardt.damping import typical_link

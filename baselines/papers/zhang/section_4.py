@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import SAME, below, falls, roughness
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
@@ -24,6 +23,7 @@ from baselines.papers.zhang.episodes import (
     settled_error,
     settled_from,
 )
+from baselines.recording import Episode
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from ikgym.validation import FloatArray
 

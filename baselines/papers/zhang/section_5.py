@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from baselines.episodes import Episode
 from baselines.papers.comparisons import SAME, below, extent, larger
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
@@ -22,6 +21,7 @@ from baselines.papers.zhang.episodes import (
     settled_error,
     unmet_of_the_way,
 )
+from baselines.recording import Episode
 from baselines.status import Status
 from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.validation import FloatArray

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.arms.arm import Arm, UrdfReference
+from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
+from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
 from ikgym.arms.urdf.chain import read_chain
 from ikgym.arms.urdf.joint import MOVING, UrdfJoint

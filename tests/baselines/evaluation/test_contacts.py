@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, rollout, rollouts
+from baselines.episodes import rollout, rollouts
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.export import CONTACTS, check_log, trajectory_log
@@ -17,6 +17,7 @@ from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.records import markdown, records
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
+from baselines.recording import Seeds
 from ikgym.obstacles.solids import closest
 from tests.baselines.evaluation.html.test_series import decoded
 from tests.bodied import blocked, crowd

@@ -8,12 +8,13 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, add_up, rollout
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.motion.free_timing import reference_at
 from baselines.evaluation.motion.stop import FEWEST
 from baselines.evaluation.records import records
+from baselines.recording import Seeds, add_up
 from tests.baselines.solvers.quadratic_program.paths import circle
 
 TASKS = ("pose", "axis", "position", "matrix", "skew")

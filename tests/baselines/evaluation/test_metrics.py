@@ -9,13 +9,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import baselines
 import ikgym
-from baselines.episodes import Episode, Seeds, rollout
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.html.series import ACCELERATION, VELOCITY, limits
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, measure
-from baselines.evaluation.summary import Spread, summarise
+from baselines.evaluation.summary import summarise
 from baselines.files import from_json
+from baselines.recording import Episode, Seeds
+from baselines.statistics import Spread
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.limited import limited

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines.evaluation.published_rule import verdict
+from baselines.evaluation.motion.published_rule import verdict
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError
 

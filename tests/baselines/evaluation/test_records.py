@@ -9,7 +9,7 @@ import scipy.stats
 from baselines.evaluate import evaluate
 from baselines.evaluation import records
 from baselines.evaluation.plots import comparison
-from baselines.evaluation.summary import geometric_interval, geometric_mean
+from baselines.statistics import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
 
 

@@ -8,11 +8,12 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, rollout, sequences
+from baselines.episodes import rollout, sequences
 from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.evaluation.play import batches, play
 from baselines.policy import Solution, SolverPolicy, statuses
+from baselines.recording import Seeds
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.evaluation.planning import planned

@@ -8,8 +8,8 @@ import pytest
 
 import baselines
 from baselines.episodes import rollouts
-from baselines.evaluation.summary import geometric_mean
 from baselines.fingerprints import fingerprint
+from baselines.statistics import geometric_mean
 from baselines.training import validation
 from baselines.training.validation import record_of, reference_costs, score, validation_seeds
 from ikgym import scenarios, tasks

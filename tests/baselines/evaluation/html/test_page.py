@@ -15,9 +15,10 @@ from baselines.evaluation.html.page import COLUMNS, embedded
 from baselines.evaluation.jobs import Options, Skipped
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.results import PAGE, Results, read_rows
-from baselines.evaluation.summary import geometric_interval, summarise
+from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import LAST, filled, html
 from baselines.files import ResultsError
+from baselines.statistics import geometric_interval
 from tests.baselines.evaluation.html.conftest import EPISODES, NASTY, STEPS
 from tests.baselines.evaluation.test_report import BASE as ROW
 

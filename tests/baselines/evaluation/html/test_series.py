@@ -5,7 +5,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, rollout
+from baselines.episodes import rollout
 from baselines.evaluation.export import FRAMES, frame_rows, trajectory_log
 from baselines.evaluation.html.series import (
     ACCELERATION,
@@ -17,6 +17,7 @@ from baselines.evaluation.html.series import (
     limits,
     thinned,
 )
+from baselines.recording import Seeds
 from tests.limited import limited
 
 

@@ -1,0 +1,45 @@
+"""The rows of a batch shared out to threads."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from baselines.policy.arguments import joined
+from baselines.policy.problem import Solution
+from ikgym.parallel import in_chunks
+
+#: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
+#: wait for others of it wait forever.
+_sharing = threading.local()
+
+
+def undivided(rows: int, grain: int) -> bool:
+    """Whether so many rows are solved in one call, not by several threads.
+
+    Args:
+        rows: Number of rows.
+        grain: Rows that are worth a thread.
+    """
+    return rows < 2 * grain or getattr(_sharing, "now", False)
+
+
+def divided(solve: Callable[[slice], Solution], rows: int, grain: int) -> Solution:
+    """The solution of all rows, each thread solving a part of them.
+
+    Args:
+        solve: Solves a part of the rows.
+        rows: Number of rows.
+        grain: Rows that are worth a thread.
+    """
+    parts: dict[int, Solution] = {}
+
+    def work(start: int, stop: int) -> None:
+        _sharing.now = True
+        try:
+            parts[start] = solve(slice(start, stop))
+        finally:
+            _sharing.now = False
+
+    in_chunks(work, rows, grain)
+    return joined([parts[start] for start in sorted(parts)])

@@ -1,0 +1,28 @@
+"""Where an arm was read from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from ikgym.validation import FloatArray
+
+
+class UrdfReference(NamedTuple):
+    """The source of an arm from a URDF file; see :func:`ikgym.arms.from_urdf`.
+
+    Attributes:
+        file: The file, as an absolute path.
+        base: The link at its beginning, None for the root.
+        tip: The link at its end, None for the only leaf.
+        tool: Tool point in the frame of the tip in [m], None for its origin. Shape (3,).
+        tool_rotation: Orientation of the tool in the frame of the tip, None for that frame's. Shape (3, 3).
+        meshes: Whether collision meshes were opened.
+    """
+
+    file: Path
+    base: str | None
+    tip: str | None
+    tool: FloatArray | None
+    tool_rotation: FloatArray | None
+    meshes: bool = False
