@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from baselines.solvers.rivals.solids import WORLD, Solids
 from ikgym.arms import Arm
 from ikgym.kernels.rotations import quaternion
 from ikgym.validation import FloatArray
@@ -42,8 +44,20 @@ def urdf(arm: Arm) -> str:
     return f"<robot name={quoteattr(arm.name)}>{''.join([*links, *joints, tool])}</robot>"
 
 
-def mjcf(arm: Arm) -> str:
-    """The chain of an arm from body ``base`` to body ``tool``, with its limits of position: MJCF has no others."""
+def geom_name(i: int) -> str:
+    """Name of solid i in an MJCF."""
+    return f"solid{i}"
+
+
+def mjcf(arm: Arm, solids: Solids | None = None) -> str:
+    """The chain of an arm from body ``base`` to body ``tool``, with its limits of position: MJCF has no others.
+
+    Args:
+        arm: The arm.
+        solids: Its bodies and the obstacles. MuJoCo counts a moving base as none of the world, so that link 1 can meet
+            what is fixed to the world.
+    """
+    solids = solids or Solids()
     body = f'<body name="{TIP}" pos="{_text(arm.tool)}" quat="{_text(quaternion(arm.tool_rotation))}">{_MASS}</body>'
     for i in reversed(range(arm.joints)):
         # A joint with one limit alone is limited, too, and the other one is out of reach.
@@ -53,12 +67,29 @@ def mjcf(arm: Arm) -> str:
         body = (
             f'<body name="link{i + 1}" pos="{_text(arm.offsets[i])}">{_MASS}'
             f'<joint name="{joint_name(i)}" type="{"slide" if arm.prismatic[i] else "hinge"}" '
-            f'axis="{_text(arm.axes[i])}" {reach}/>{body}</body>'
+            f'axis="{_text(arm.axes[i])}" {reach}/>{_geoms(solids, i + 1)}{body}</body>'
         )
+    mocap = ' mocap="true"' if solids.each else ""
+    base = f'<body name="{BASE}"{mocap}>{_geoms(solids, 0)}{body}</body>'
     return (
         f'<mujoco model="{arm.name}"><compiler angle="radian"/>'
-        f'<worldbody><body name="{BASE}">{body}</body></worldbody></mujoco>'
+        f"<worldbody>{_geoms(solids, WORLD)}{base}</worldbody></mujoco>"
     )
+
+
+def _geoms(solids: Solids, link: int) -> str:
+    out = []
+    for i, (of, kind, rotation, position, half, radius) in enumerate(solids.each):
+        sizes: dict[str, Sequence[float] | FloatArray] = {
+            "sphere": (radius,),
+            "capsule": (radius, half[2]),
+            "box": half,
+            "plane": (0.0, 0.0, 1.0),
+        }
+        place = f'pos="{_text(position)}" quat="{_text(quaternion(rotation))}"'
+        if of == link:
+            out.append(f'<geom name="{geom_name(i)}" type="{kind}" size="{_text(sizes[kind])}" {place}/>')
+    return "".join(out)
 
 
 #: MuJoCo refuses bodies that move and have no mass; kinematics take no notice of it.
@@ -75,5 +106,5 @@ def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
     return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
 
 
-def _text(numbers: FloatArray | tuple[float, ...]) -> str:
+def _text(numbers: FloatArray | Sequence[float]) -> str:
     return " ".join(repr(float(x)) for x in numbers)

@@ -10,7 +10,8 @@ import numpy as np
 
 from baselines.policy.parameters import parameter
 from baselines.solvers.rivals.base import Rival, Seen, Step
-from baselines.solvers.rivals.model_files import TIP, joint_name, mjcf, urdf
+from baselines.solvers.rivals.model_files import TIP, geom_name, joint_name, mjcf, urdf
+from baselines.solvers.rivals.solids import Solids, check_at_rest, geometry_model, solids_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.validation import FloatArray, number
 
@@ -35,9 +36,10 @@ class TaskProgram(Rival, abc.ABC):
         damping: Of the whole program.
         limit_gain: Share of the distance to a position limit that a step may take. Above 0, at most 1.
         solver: Of the program, a name of `qpsolvers`.
+        clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
 
     Raises:
-        InvalidInputError: See :class:`Rival`; or a parameter is out of its range.
+        InvalidInputError: See :class:`Rival`; a parameter is out of its range; or obstacles move or are drawn.
         UnknownNameError: There is no such solver, or it is not installed.
         MissingDependencyError: The package, or `qpsolvers`, is not installed.
     """
@@ -51,9 +53,11 @@ class TaskProgram(Rival, abc.ABC):
     damping: float = parameter(1e-12, number, at_least=0.0)
     limit_gain: float = parameter(0.5, number, above=0.0, at_most=1.0)
     solver: str = "daqp"
+    clearance: float = parameter(0.005, number, at_least=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_at_rest(self.name, self.problem)
         if self.share > 1.0:
             raise InvalidInputError(f"posture_rate · Δt: expected at most 1, got {self.share:g}.")
         known = self.imported("qpsolvers").available_solvers
@@ -79,9 +83,17 @@ class Pink(TaskProgram):
     The model is handed over as URDF. Limits are those of position, velocity and, where all joints have them,
     acceleration with the braking distance that it needs (`AccelerationLimit`). quadprog is the solver of its README;
     it keeps limits to rounding, where DAQP keeps them to 1e-6 rad a step.
+
+    Where bodies matter, a `SelfCollisionBarrier` has all pairs of them and of obstacles, measured by coal.
+
+    Args:
+        barrier_gain: Share of the distance to `clearance` that a pair may lose in a second, in [1/s].
+        safe_displacement_gain: Of the barrier: damping by the squared norm of its Jacobian.
     """
 
     solver: str = "quadprog"
+    barrier_gain: float = parameter(20.0, number, above=0.0)
+    safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
 
     name: ClassVar[str] = "pink"
     package: ClassVar[str] = "pink"
@@ -91,7 +103,9 @@ class Pink(TaskProgram):
         """See :meth:`Rival.make_step`."""
         pink, pinocchio = self.imported(), self.imported("pinocchio")
         model = pinocchio.buildModelFromXML(urdf(self.model))
-        configuration = pink.Configuration(model, model.createData(), np.zeros(model.nq))
+        solids = solids_of(self.problem)
+        geometry = geometry_model(solids, pinocchio, self.imported("coal")) if solids.pairs else None
+        configuration = pink.Configuration(model, model.createData(), np.zeros(model.nq), collision_model=geometry)
         frame = pink.tasks.FrameTask(TIP, *self.frame_costs, lm_damping=self.lm_damping, gain=self.gain)
         posture = [pink.tasks.PostureTask(self.posture_cost, gain=self.share)] if self.posture_cost else []
         tasks = [frame, *posture]
@@ -99,6 +113,7 @@ class Pink(TaskProgram):
         acceleration = self._acceleration(pink, model)
         limits += acceleration
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping, "safety_break": False}
+        options["barriers"] = self._barriers(pink, solids)
 
         def step(seen: Seen) -> FloatArray | None:
             configuration.update(seen.q)
@@ -119,15 +134,27 @@ class Pink(TaskProgram):
         limit = np.array(self.problem.model.acceleration_limit)
         return [pink.limits.AccelerationLimit(model, limit)] if np.isfinite(limit).all() else []
 
+    def _barriers(self, pink: Any, solids: Solids) -> list[Any]:
+        options = {"safe_displacement_gain": self.safe_displacement_gain, "d_min": self.clearance}
+        make, pairs = pink.barriers.SelfCollisionBarrier, len(solids.pairs)
+        return [make(pairs, self.barrier_gain, **options)] if pairs else []
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mink(TaskProgram):
     """mink (Zakka, on MuJoCo): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
 
-    The model is handed over as MJCF. Limits are those of position and velocity; it has none of acceleration.
+    The model is handed over as MJCF. Limits are those of position and velocity; it has none of acceleration. Where
+    bodies matter, a `CollisionAvoidanceLimit` has all pairs of them and of obstacles, measured by MuJoCo.
+
+    Args:
+        collision_gain: Share of the distance to `clearance` that a pair may lose in a step. Above 0, at most 1.
+        detection_distance: Distance from which on a pair is looked at, in [m].
     """
 
     limit_gain: float = 0.95
+    collision_gain: float = parameter(0.85, number, above=0.0, at_most=1.0)
+    detection_distance: float = parameter(0.01, number, above=0.0)
 
     name: ClassVar[str] = "mink"
     package: ClassVar[str] = "mink"
@@ -136,13 +163,15 @@ class Mink(TaskProgram):
     def make_step(self) -> Step:
         """See :meth:`Rival.make_step`."""
         mink, mujoco = self.imported(), self.imported("mujoco")
-        model = mujoco.MjModel.from_xml_string(mjcf(self.model))
+        solids = solids_of(self.problem)
+        model = mujoco.MjModel.from_xml_string(mjcf(self.model, solids))
         configuration = mink.Configuration(model)
         frame = mink.FrameTask(TIP, "body", *self.frame_costs, gain=self.gain, lm_damping=self.lm_damping)
         posture = [mink.PostureTask(model, self.posture_cost, gain=self.share)] if self.posture_cost else []
         tasks = [frame, *posture]
         speeds = {joint_name(i): limit for i, limit in enumerate(self.model.velocity_limit) if np.isfinite(limit)}
         limits = [mink.ConfigurationLimit(model, self.limit_gain), mink.VelocityLimit(model, speeds)]
+        limits += self._collisions(mink, model, solids)
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping}
         pose = np.eye(4)
 
@@ -159,3 +188,9 @@ class Mink(TaskProgram):
             return found
 
         return step
+
+    def _collisions(self, mink: Any, model: Any, solids: Solids) -> list[Any]:
+        pairs = [([geom_name(i)], [geom_name(j)]) for i, j in solids.pairs]
+        # mink 1.3 allows a step to take gain / Δt of the distance instead of gain.
+        numbers = self.collision_gain * self.problem.dt, self.clearance, self.detection_distance
+        return [mink.CollisionAvoidanceLimit(model, pairs, *numbers)] if pairs else []
