@@ -1,4 +1,4 @@
-"""Bodies and obstacles as solids, for pictures: their surfaces, their outlines, and the closest pair.
+"""Bodies and obstacles as solids: their surfaces, their outlines, and the closest pair.
 
 All of them are boxes with rounded edges, rows of :class:`ikgym.kernels.bodies.Surroundings`.
 """
@@ -55,19 +55,20 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
 
 
 def solids_of(obstacles: Sequence[Obstacle], times: FloatArray, model: Arm) -> FloatArray:
-    """The obstacles of an episode at some times.
+    """Obstacles at some times; those that are drawn as they are before.
 
     Args:
-        obstacles: See :meth:`ikgym.Scenario.obstacles_of`.
+        obstacles: Those of a scenario, or of an episode, see :meth:`ikgym.Scenario.obstacles_of`.
         times: In [s]. Shape (k,).
         model: The arm through whose kinematics motions are mapped that are joint paths.
 
     Returns:
         Shape (k, o, 16), or (1, o, 16) where none moves.
     """
-    along = [one.along(times, model) for one in obstacles]
+    along = [one.along(times, model).reshape(-1, one.count, 16) for one in obstacles]
     rows = max(map(len, along), default=1)
-    return np.stack([np.broadcast_to(one, (rows, 16)) for one in along], axis=1) if along else np.empty((1, 0, 16))
+    parts = [np.broadcast_to(numbers, (rows, *numbers.shape[1:])) for numbers in along]
+    return np.concatenate([np.empty((rows, 0, 16)), *parts], axis=1)
 
 
 def on_links(bodies: Bodies) -> FloatArray:

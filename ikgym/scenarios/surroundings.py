@@ -10,8 +10,9 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.bodies import OBSTACLE, Surroundings
+from ikgym.kernels.bodies import Surroundings
 from ikgym.obstacles import Obstacle, drawn
+from ikgym.obstacles.solids import solids_of
 from ikgym.plant import Plant
 from ikgym.plant.draw import episode_key
 from ikgym.scenarios.reference import Reference
@@ -52,10 +53,7 @@ class Surrounded(Reference):
         Returns:
             Shape (k, o, 16), or (1, o, 16) where none moves.
         """
-        along = [one.along(self.times(steps), self.model).reshape(-1, one.count, OBSTACLE) for one in self.obstacles]
-        rows = max(map(len, along), default=1)
-        parts = [np.broadcast_to(numbers, (rows, *numbers.shape[1:])) for numbers in along]
-        return np.concatenate([np.empty((rows, 0, OBSTACLE)), *parts], axis=1)
+        return solids_of(self.obstacles, self.times(steps), self.model)
 
     def obstacle_bounds(self) -> tuple[FloatArray, FloatArray]:
         """The smallest and the largest numbers that obstacles have in any episode. Shapes (o, 16)."""
