@@ -95,7 +95,7 @@ class QuadraticProgram(VelocityProgram):
 
     task_scaling: bool = parameter(False, flag)
     clearance: float = parameter(0.005, number, at_least=0.0)
-    influence: float = parameter(0.3, number, above=0.0)
+    influence: float = parameter(0.2, number, above=0.0)
     repulsion: float = parameter(10.0, number, at_least=0.0)
 
     name: ClassVar[str] = "qp"
