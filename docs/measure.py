@@ -55,6 +55,21 @@ ADAPTIVE: dict[str, tuple[str, dict[str, Any]]] = {
     "offset_free": ("offset_free", AROUND),
 }
 
+#: Columns of `bodies`.
+BODIES = (
+    "scenario",
+    "policy",
+    "episodes",
+    "relative_to",
+    "cost_ratio",
+    "low",
+    "high",
+    "error_mm",
+    "stopped_percent",
+    "clearance_mm",
+    "time_p50_us",
+)
+
 #: Steps over which times in batches are taken: a multiple of all intervals.
 BATCHED = 256
 
@@ -69,7 +84,7 @@ class Command:
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_interval, agents_panda,
-    plants and contexts."""
+    plants, bodies and contexts."""
     new: bool = False
     """Measure only lines that have no cost ratio yet, and no times."""
     times: bool = False
@@ -209,6 +224,29 @@ def periods(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     return out
 
 
+def bodies(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
+    """Costs, stops and clearances in scenarios with bodies, measured as a whole.
+
+    Raises:
+        SystemExit: A part alone is asked for.
+    """
+    if only_new or only_times:
+        raise SystemExit("bodies: costs are relative to the lowest in the table, which is measured as a whole.")
+    out = []
+    for scenario, some in itertools.groupby(from_csv((RESULTS / "bodies.csv").read_text(encoding="utf-8")), _scenario):
+        lines = list(some)
+        played, episodes = [line["policy"] for line in lines], int(lines[0]["episodes"])
+        rows = evaluate(scenario, played, episodes=episodes, timed=TIMED, progress=True)
+        errors = {name: max(row.position_error_max for row in rows if row.policy == name) for name in played}
+        found = [{**record, "error_mm": 1e3 * errors[record["policy"]]} for record in records(rows, played)]
+        out += [{column: record[column] for column in BODIES} for record in found]
+    return out
+
+
+def _scenario(line: Line) -> str:
+    return str(line["scenario"])
+
+
 def plants(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     """Costs of adaptive policies on imperfect plants, by the lines of the table; there are no times."""
     old = from_csv((RESULTS / "plants.csv").read_text(encoding="utf-8"))
@@ -239,7 +277,13 @@ def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        own = {"agents_interval": intervals, "contexts": contexts.measured, "periods": periods, "plants": plants}
+        own = {
+            "agents_interval": intervals,
+            "bodies": bodies,
+            "contexts": contexts.measured,
+            "periods": periods,
+            "plants": plants,
+        }
         make = own.get(name, functools.partial(measured, name))
         new = make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
