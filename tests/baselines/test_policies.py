@@ -563,6 +563,7 @@ def test_what_exceeds_the_velocity_limit_is_said():
 
 def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
     good()  # compiles the simulation where no other test has
+    caplog.clear()
     monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
     monkeypatch.setattr(ikgym.kernels.compilation.announced.__wrapped__, "__defaults__", (0.01,))
 
