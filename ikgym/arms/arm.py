@@ -14,6 +14,7 @@ from ikgym.arms.bodies import Bodies, Neighbour
 from ikgym.arms.source import UrdfReference
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import kinematics
+from ikgym.kernels.bodies import clearance_rows
 from ikgym.kernels.kinematics import Chain
 from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix, shortened
 
@@ -228,12 +229,10 @@ class Arm(Frozen):
             InvalidInputError: q has the wrong length or is not finite.
             UnknownNameError: An obstacle ignores a body that there is not.
         """
-        from ikgym.kernels import bodies as kernels  # take longer to load than all arms
-
         rows, lead = self._rows(q)
         distances, pairs = np.empty(len(rows)), np.empty((len(rows), 2), dtype=np.int64)
         around = self.bodies.surroundings(obstacles)
-        kernels.clearance_rows(self.chain, self.bodies.shapes, *around, rows, distances, pairs)
+        clearance_rows(self.chain, self.bodies.shapes, *around, rows, distances, pairs)
         return distances.reshape(lead), pairs.reshape(*lead, 2)
 
     def joint_points(self, q: npt.ArrayLike) -> FloatArray:

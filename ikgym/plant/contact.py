@@ -11,12 +11,12 @@ from ikgym.kernels.random_numbers import stream
 from ikgym.kernels.simulation import Flags
 from ikgym.plant.arm_kernels import ZERO, turn, zero_of
 
-# Bodies that come so near within a step, in [m], count as touching: what is certified to be clear has a limit.
+# Bodies that come so near within a step, in [m], count as touching: a certificate of clearance needs a limit.
 TOUCHING = 1e-6
 
 
 class Contacts(NamedTuple):
-    """Bodies and obstacles of N arms, and what they have come to.
+    """Bodies and obstacles of N arms, their clearances and stops.
 
     Attributes:
         links: See :class:`ikgym.kernels.bodies.Shapes`. Shape (k,).

@@ -60,7 +60,7 @@ def sweep(arm: Arm, travel: FloatArray, longer: float) -> FloatArray:
     Args:
         arm: The arm.
         travel: Largest absolute joint coordinates; only those of prismatic joints count. Shape (n,).
-        longer: What is added to each offset, in [m].
+        longer: Length that is added to each offset, in [m].
     """
     bodies = arm.bodies
     ends = np.maximum(np.linalg.norm(bodies.starts, axis=1), np.linalg.norm(bodies.ends, axis=1))

@@ -20,7 +20,7 @@ POSITION, ORIENTATION, TURN, TRAVEL = 1e-4, np.radians(0.1), np.radians(7.0), 0.
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What a joint path does at the waypoints of a problem.
+    """Errors, motions and clearance of a joint path at the waypoints of a problem.
 
     Args:
         position: Largest error in [m].

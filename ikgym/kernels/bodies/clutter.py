@@ -23,7 +23,7 @@ NUMBERS = 10
 
 
 class Drawing(NamedTuple):
-    """What is drawn, see :class:`ikgym.obstacles.random_boxes.RandomBoxes`.
+    """The distribution of boxes, see :class:`ikgym.obstacles.random_boxes.RandomBoxes`.
 
     Attributes:
         lower: Of the centres in [m]. Shape (3,).
@@ -52,7 +52,7 @@ def draw_boxes(chain, shapes, checked, bends, drawing, paths, keys, out, found):
         checked: Whether a body may not touch a box. Shape (b,).
         bends: Bounds of the second derivatives of points of each body by two joint coordinates, in [m] per unit of
             both. Shape (b,).
-        drawing: What is drawn.
+        drawing: Their distribution, a :class:`Drawing`.
         paths: Joint coordinates at the steps in [rad] or [m]; straight on in between. Shape (k, t, n).
         keys: Of the random numbers. Shape (k,).
         out: Receives the boxes, see :class:`ikgym.kernels.bodies.Surroundings`. Shape (k, count, 16).

@@ -42,6 +42,15 @@ def test_published_trajectories_fail():
     assert {one.clearance > 0.0 for one in judged} == {False, True}
 
 
+@pytest.mark.slow
+def test_no_published_trajectory_passes():
+    """The figures of docs/bodies.md."""
+    names = [(name, method) for name in problems.OBSTRUCTED for method in problems.published(name)]
+    judged = [verdict(scenarios.get(name), problems.trajectory(name, method)) for name, method in names]
+    assert len(judged) == 102
+    assert not any(one.passed or one.followed for one in judged)
+
+
 def test_bad_input():
     with pytest.raises(InvalidInputError, match="with a published path, got 'panda-circle'"):
         verdict(scenarios.get("panda-circle"), np.zeros((1, 7)))
