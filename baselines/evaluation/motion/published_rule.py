@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.rotations import quaternion_of
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import PublishedPath
 from ikgym.trajectories.orientations import matrices
@@ -65,8 +65,7 @@ def verdict(scenario: Scenario, q: FloatArray) -> Verdict:
     arm, (positions, quaternions, _) = scenario.arm, scenario.trajectory.waypoints
     path = float_array("q", q, (len(positions), arm.joints))
     rotations, there = arm.forward(path)
-    apart = matrices(quaternions).transpose(0, 2, 1) @ rotations
-    angles = [2.0 * np.arccos(min(abs(quaternion_of(*one.reshape(3, 3))[0]), 1.0)) for one in apart]
+    angles = map(geodesic_angle, rotations, matrices(quaternions))
     endless = np.isinf(arm.upper - arm.lower)
     moved = np.abs(np.diff(path, axis=0))
     moved = np.where(endless, np.abs(np.remainder(moved + np.pi, 2.0 * np.pi) - np.pi), moved)
