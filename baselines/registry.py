@@ -69,6 +69,7 @@ _import_paths: dict[str, str] = {
 #: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
+    "planned": "baselines.paths.planned:Planned",
     "published": f"{_SOLVERS}.references.published:Published",
     "told": f"{_SOLVERS}.references.told:Told",
 }

@@ -1,0 +1,189 @@
+"""Joint paths along a whole reference, by dynamic programming over the inverse kinematics of its poses."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from baselines.paths.starts import solutions
+from ikgym.exceptions import InvalidInputError
+from ikgym.obstacles.solids import closest, solids_of
+from ikgym.scenarios import Scenario
+from ikgym.validation import BoolArray, FloatArray, float_array, per_joint
+
+#: Joint motions aside from the task, as shares of the largest ones that are allowed, and how many random directions
+#: they have in null spaces of several dimensions.
+ASIDE, DIRECTIONS = np.linspace(-0.9, 0.9, 5), 3
+#: Share of the largest motion that is used, and distance in [m] and angle in [rad] within which a pose is met.
+USED, TOLERANCE = 0.999, 1e-9
+#: Between two knots bodies are checked at these parts of the way.
+PARTS = (0.25, 0.5, 0.75, 1.0)
+#: Postures are left out whose Jacobian, in units of the largest motions, has less than this on a diagonal.
+SINGULAR = 1e-6
+
+
+class Layer(NamedTuple):
+    """Postures at one knot.
+
+    Attributes:
+        q: Joint coordinates in [rad] or [m]. Shape (k, n).
+        cost: Sum of the squared motions up to here, in units of the largest ones. Shape (k,).
+        before: The posture of the knot before that each is reached from. Shape (k,).
+    """
+
+    q: FloatArray
+    cost: FloatArray
+    before: npt.NDArray[np.int64]
+
+    def of(self, chosen: BoolArray | npt.NDArray[np.int64]) -> Layer:
+        """Some of the postures."""
+        return Layer(self.q[chosen], self.cost[chosen], self.before[chosen])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Routes:
+    """Searches the joint path with the least motion through the poses of a path, clear of all bodies.
+
+    From each posture at a knot the next pose is reached by several joint motions, which differ in the null space of the
+    Jacobian. Those within the limits, clear by the margin and no larger than allowed are kept, one for each cell of the
+    joint space: the one with the least sum of squared motions so far. This is forward dynamic programming, as for
+    redundancy resolution on grids (Pashkevich, Dolgui and Chumakov 2004; Ferrentino and Chiacchio 2020), with postures
+    that lie on the path exactly. A path that is not found may exist between the cells.
+
+    Args:
+        scenario: A scenario whose path is the same at every reset, and whose task is a position, or a whole pose.
+        times: Of the knots in [s]. Shape (k,).
+        largest: Largest motion of each joint between two knots, in [rad] or [m]. Shape (n,).
+        margin: Distance that bodies keep at knots and on the way between them, in [m].
+        cell: Size of the cells, as a share of the largest motion.
+        postures: Most postures that are kept at a knot.
+
+    Raises:
+        InvalidInputError: The scenario is random or its task another one, or a number is wrong.
+    """
+
+    scenario: Scenario
+    times: FloatArray
+    largest: FloatArray
+    margin: float = 0.002
+    cell: float = 0.6
+    postures: int = 800
+
+    def __post_init__(self) -> None:
+        if self.scenario.random or self.scenario.task.error_size not in (3, 6):
+            raise InvalidInputError(
+                f"Scenario {self.scenario.name!r}: expected one path, and a task of position or of position and "
+                "orientation."
+            )
+        object.__setattr__(self, "times", float_array("times", self.times, (None,)))
+        object.__setattr__(self, "largest", per_joint("largest", self.largest, self.scenario.joints))
+        if (self.largest <= 0.0).any():
+            raise InvalidInputError(f"largest: expected numbers above 0, got {self.largest}.")
+
+    def route(self, start: FloatArray | None = None) -> FloatArray:
+        """Joint coordinates at the knots in [rad] or [m], as far as there is a way. Shape (r, n), r at most k.
+
+        Args:
+            start: Joint coordinates at the first knot in [rad] or [m], where they are given; else any will do.
+        """
+        rng = np.random.default_rng(0)
+        q = solutions(self.scenario) if start is None else start[None]
+        layers = [Layer(q, np.zeros(len(q)), np.zeros(len(q), dtype=np.int64))]
+        layers[0] = layers[0].of(self._clear(0, q))
+        while len(layers) < len(self.times) and len(layers[-1].q):
+            layers.append(self._next(len(layers), layers[-1], rng))
+        if not len(layers[-1].q):
+            layers.pop()
+        row, out = int(np.argmin(layers[-1].cost)) if layers else 0, []
+        for layer in reversed(layers):
+            out.append(layer.q[row])
+            row = int(layer.before[row])
+        return np.array(out[::-1]).reshape(-1, self.scenario.joints)
+
+    def _next(self, knot: int, last: Layer, rng: np.random.Generator) -> Layer:
+        """The postures at a knot that can be reached from those before."""
+        arm = self.scenario.arm
+        moves, rows = self._moves(knot, last.q, rng)
+        cost = last.cost[rows] + (moves * moves).sum(axis=1)
+        q = np.clip(last.q[rows] + self.largest * moves, arm.lower, arm.upper)
+        next_ones = Layer(q, cost, rows).of(self._cheapest(q, cost, rng))
+        q, met = arm.inverse(*self._pose(knot), start=next_ones.q, tolerance=TOLERANCE, restarts=0)
+        moved = (q - last.q[next_ones.before]) / self.largest
+        near = met & (np.abs(moved).max(axis=1) <= USED)
+        cost = last.cost[next_ones.before] + (moved * moved).sum(axis=1)
+        found = Layer(q, cost, next_ones.before).of(near)
+        clear = np.all([self._clear(knot - 1.0 + part, self._between(last, found, part)) for part in PARTS], axis=0)
+        return found.of(clear)
+
+    def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""
+        arm = self.scenario.arm
+        rotation, position = self._pose(knot)
+        turned, there, jacobian = arm.forward_and_jacobian(q)
+        error = position - there
+        if rotation is not None:
+            error = np.hstack([error, 0.5 * np.cross(turned, rotation[None], axis=1).sum(axis=2)])
+        jacobian = jacobian[:, : error.shape[1]] * self.largest
+        basis, triangle = np.linalg.qr(jacobian.transpose(0, 2, 1), mode="complete")
+        rank = error.shape[1]
+        triangle = triangle[:, :rank].transpose(0, 2, 1)
+        solvable = np.abs(np.diagonal(triangle, axis1=1, axis2=2)).min(axis=1) > SINGULAR
+        rows = np.flatnonzero(solvable)
+        least = np.linalg.solve(triangle[rows], error[rows, :, None])
+        least = (basis[rows, :, :rank] @ least)[..., 0]
+        free = basis[rows, :, rank:]
+        moves, begins = [], []
+        for _ in range(1 if free.shape[2] == 1 else DIRECTIONS):
+            direction = (free @ rng.normal(size=(len(rows), free.shape[2], 1)))[..., 0]
+            for share in ASIDE:
+                moves.append(least + _aside(least, direction, share)[:, None] * direction)
+                begins.append(rows)
+        every = np.concatenate(moves)
+        small = np.abs(every).max(axis=1) <= 1.0
+        return every[small], np.concatenate(begins)[small]
+
+    def _pose(self, knot: int) -> tuple[FloatArray | None, FloatArray]:
+        frame = self._frames[knot]
+        return (frame[:9].reshape(3, 3) if self.scenario.task.has_orientation else None), frame[-3:]
+
+    @functools.cached_property
+    def _frames(self) -> FloatArray:
+        return self.scenario.trajectory.frames(self.times, self.scenario.model)
+
+    def _between(self, last: Layer, found: Layer, part: float) -> FloatArray:
+        begin = last.q[found.before]
+        return begin + part * (found.q - begin)
+
+    def _wrapped(self, q: FloatArray) -> FloatArray:
+        """The same postures, joints without limits within a turn."""
+        endless = np.isinf(self.scenario.arm.upper - self.scenario.arm.lower)
+        return np.where(endless, np.remainder(q, 2.0 * np.pi), q)
+
+    def _cheapest(self, q: FloatArray, cost: FloatArray, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+        """The rows of the least costs in each cell, some of them where they are too many. Shapes (N, n), (N,)."""
+        order = np.argsort(cost, kind="stable")
+        cells = np.floor(self._wrapped(q[order]) / (self.cell * self.largest)).astype(np.int64)
+        chosen: npt.NDArray[np.int64] = order[np.unique(cells, axis=0, return_index=True)[1]]
+        return chosen if len(chosen) <= self.postures else rng.choice(chosen, self.postures, replace=False)
+
+    def _clear(self, knot: float, q: FloatArray) -> BoolArray:
+        """Whether bodies keep the margin when the path is at a knot, or between two."""
+        scenario = self.scenario
+        if not scenario.collides:
+            return np.ones(len(q), dtype=np.bool_)
+        time = np.interp([knot], np.arange(len(self.times)), self.times)
+        boxes = solids_of(scenario.obstacles, time, scenario.model)
+        return closest(scenario.arm, q, boxes, scenario.surroundings.checked).distances > self.margin
+
+
+def _aside(least: FloatArray, direction: FloatArray, share: float) -> FloatArray:
+    """How far to go along directions, of shape (N, n): a share of the largest that keeps all joints within 1. (N,)."""
+    with np.errstate(divide="ignore"):
+        ends = np.sort([(-1.0 - least) / direction, (1.0 - least) / direction], axis=0)
+    low, high = ends[0].max(axis=1), ends[1].min(axis=1)
+    out: FloatArray = 0.5 * (low + high + share * (high - low))
+    return out
