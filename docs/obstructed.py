@@ -1,13 +1,15 @@
 """Problems with obstacles that others published, by CppFlow's rule: ``python -m docs.obstructed``.
 
-Writes `results/obstructed.csv`, a line for each problem; a line that stands there is not measured again. The start is
-free: `qp` plays from up to a hundred postures at the first pose, `rhc_foresight` from the start that `planned` has. The
-joint velocities of both are limited to 7° a waypoint.
+Writes `results/obstructed_paths.csv`, a line for each problem, and their sums, `results/obstructed.csv`. A line that
+stands there is not measured again. The start is free: `qp` plays from up to a hundred postures at the first pose,
+`rhc_foresight` from the start that `planned` has. The joint velocities of both are limited to 7° a waypoint.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,31 +26,36 @@ from ikgym import problems, scenarios
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-RESULTS = Path(__file__).parent / "results" / "obstructed.csv"
-#: Steps from waypoint to waypoint, postures from which `qp` begins, and the second search of a way, which is finer.
-STRIDE, STARTS, FINE = 10, 100, {"cell": 0.3, "postures": 2500}
+RESULTS = Path(__file__).parent / "results"
+PATHS, TABLE = RESULTS / "obstructed_paths.csv", RESULTS / "obstructed.csv"
+#: Sets of problems by the beginnings of their names.
+SETS = {"RL-ITG, drawn": "rlitg-s", "RL-ITG, random": "rlitg-obstacle", "CppFlow": "cppflow"}
+#: Steps from waypoint to waypoint, most postures from which `qp` begins, and a finer search where there is no way.
+STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500})
 
 
 def line(name: str) -> dict[str, Any]:
     """What passes of a problem, and how many of its poses can be reached, with and without collisions."""
     scenario = scenarios.get(name)
-    poses = len(problems.waypoints(name).positions)
+    alone, poses = scenario.replace(collisions=False), len(problems.waypoints(name).positions)
     found = route(scenario)
+    free = found if len(found) == poses else route(alone)
+    if len(free) < poses:
+        free = route(alone, FINE)
+    if len(found) < len(free):
+        found = route(scenario, FINE)
     whole = len(found) == poses
-    out: dict[str, Any] = {"problem": name, "poses": poses, "reached": len(found)}
-    out["without_collisions"] = poses if whole else len(route(scenario.replace(collisions=False)))
+    out: dict[str, Any] = {"problem": name, "poses": poses, "reached": len(found), "without_collisions": len(free)}
     for policy in ("planned", "rhc_foresight"):
         out[policy] = int(judged(scenario, found[0], policy).passed) if whole else 0
     passed, starts = among_starts(scenario)
     return out | {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
 
 
-def route(scenario: Scenario) -> FloatArray:
+def route(scenario: Scenario, search: Mapping[str, Any] = MappingProxyType({})) -> FloatArray:
     """The way along the waypoints, as far as there is one, from any start."""
-    knots = scenario.times(scenario.steps + 1)[::STRIDE]
     largest = np.where(scenario.arm.prismatic, TRAVEL, TURN)
-    found = Routes(scenario, knots, largest).route()
-    return found if len(found) == len(knots) else Routes(scenario, knots, largest, **FINE).route()  # type: ignore[arg-type]
+    return Routes(scenario, scenario.times(scenario.steps + 1)[::STRIDE], largest, **search).route()
 
 
 def judged(scenario: Scenario, start: FloatArray, policy: str) -> Verdict:
@@ -79,14 +86,28 @@ def among_starts(scenario: Scenario) -> tuple[int, int]:
     return sum(verdict(scenario, paths[:, i]).passed for i in range(len(q))), len(q)
 
 
+def table(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """How many problems have a way, and how many each policy passes."""
+    out = []
+    for label, beginning in SETS.items():
+        here = [one for one in lines if one["problem"].startswith(beginning)]
+        ways = {
+            key: sum(int(one[key]) == int(one["poses"]) for one in here) for key in ("without_collisions", "reached")
+        }
+        passed = {policy: sum(int(one[policy]) for one in here) for policy in ("planned", "qp", "rhc_foresight")}
+        out.append({"set": label, "problems": len(here), **ways, **passed})
+    return out
+
+
 def main() -> None:
     """Measures what is missing."""
-    lines = list(from_csv(RESULTS.read_text(encoding="utf-8"))) if RESULTS.exists() else []
+    lines = list(from_csv(PATHS.read_text(encoding="utf-8"))) if PATHS.exists() else []
     for name in problems.OBSTRUCTED:
         if not any(one["problem"] == name for one in lines):
             lines.append(line(name))
-            write(RESULTS, to_csv(lines).encode())
+            write(PATHS, to_csv(lines).encode())
             print(" ".join(map(str, lines[-1].values())), flush=True)
+    write(TABLE, to_csv(table(lines)).encode())
 
 
 if __name__ == "__main__":

@@ -110,12 +110,12 @@ class Routes:
         moves, rows = self._moves(knot, last.q, rng)
         cost = last.cost[rows] + (moves * moves).sum(axis=1)
         q = np.clip(last.q[rows] + self.largest * moves, arm.lower, arm.upper)
-        next_ones = Layer(q, cost, rows).of(self._cheapest(q, cost, rng))
-        q, met = arm.inverse(*self._pose(knot), start=next_ones.q, tolerance=TOLERANCE, restarts=0)
-        moved = (q - last.q[next_ones.before]) / self.largest
+        tried = Layer(q, cost, rows).of(self._cheapest(q, cost, rng))
+        q, met = arm.inverse(*self._pose(knot), start=tried.q, tolerance=TOLERANCE, restarts=0)
+        moved = (q - last.q[tried.before]) / self.largest
         near = met & (np.abs(moved).max(axis=1) <= USED)
-        cost = last.cost[next_ones.before] + (moved * moved).sum(axis=1)
-        found = Layer(q, cost, next_ones.before).of(near)
+        cost = last.cost[tried.before] + (moved * moved).sum(axis=1)
+        found = Layer(q, cost, tried.before).of(near)
         clear = np.all([self._clear(knot - 1.0 + part, self._between(last, found, part)) for part in PARTS], axis=0)
         return found.of(clear)
 
