@@ -233,20 +233,6 @@ def test_rollouts_are_the_same_in_a_fresh_process(capsys):
     assert len(here.strip()) == 64
 
 
-def test_importing_changes_no_global_state():
-    code = (
-        "import warnings, numpy as np, gymnasium, matplotlib, os\n"
-        "before = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
-        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
-        "import ikgym, baselines\n"
-        "after = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
-        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
-        "assert before == after\n"
-        "import sys; assert 'matplotlib.pyplot' not in sys.modules and 'torch' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
 def test_spawned_workers():
     envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
     try:

@@ -2,7 +2,6 @@ import itertools
 import logging
 import pickle
 import subprocess
-import sys
 
 import gymnasium as gym
 import matplotlib.pyplot as plt
@@ -258,20 +257,6 @@ def test_a_video_can_be_recorded(tmp_path):
     assert played.stderr == b""
     shown = np.frombuffer(played.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
     assert (shown[0] != shown[-1]).any()  # encoders and decoders may drop frames at either end
-
-
-def test_rgb_array_mode_imports_no_pyplot_and_no_mode_no_matplotlib():
-    code = """
-import sys, ikgym
-env = ikgym.RedundantIKEnv("zhang3-helix")
-env.reset()
-assert "matplotlib" not in sys.modules
-env = ikgym.RedundantIKEnv("zhang3-helix", render_mode="rgb_array")
-env.reset()
-env.render()
-assert "matplotlib.pyplot" not in sys.modules
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_copies_draw_the_episode_on_a_figure_of_their_own():

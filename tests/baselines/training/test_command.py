@@ -155,16 +155,6 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == 'error: Training needs tensorboard: pip install "ikgym[train]"\n'
 
 
-def test_the_command_line_is_read_without_torch():
-    """PyTorch takes seconds to load, and is an extra."""
-    code = (
-        "import sys; from baselines.cli.commands.train import parse\n"
-        "parse(['sac', '--env', 'ikgym/Track-v0', '--out', 'x']); assert 'torch' not in sys.modules"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-
-
 def test_from_the_shell(tmp_path):
     """As a program of its own, with warnings as errors."""
     arguments = [ROOT / "train.py", "apg", "--preset", "smoke", "--no-progress", "--out", "."]
