@@ -233,6 +233,7 @@ def test_rollouts_are_the_same_in_a_fresh_process(capsys):
     assert len(here.strip()) == 64
 
 
+@pytest.mark.slow  # the environments by id have one that always runs
 def test_spawned_workers():
     envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
     try:
@@ -257,7 +258,7 @@ def test_ids_and_arguments():
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
     scenario = ikgym.scenarios.get(name)
-    changes = {"steps": min(scenario.steps, 400), "plant": ikgym.Plant(bias=0.5, noise=0.5)}
+    changes = {"steps": min(scenario.steps, 100), "plant": ikgym.Plant(bias=0.5, noise=0.5)}
     scenario = scenario.replace(**changes, obstacles=(), collisions=False)
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()
