@@ -151,7 +151,7 @@ def test_python_calls_an_inner_kernel_through_another_kernel(no_folder):
 
 
 def test_no_policy_calls_an_inner_kernel_from_python():
-    """It would be compiled in each process."""
+    """Another kernel, the entry, would be compiled for it."""
     code = (
         "import baselines, ikgym.kernels.jit as jit\n"
         "for policy in ('dls', 'qp', 'mfac', 'rhc_foresight', 'calibrated', 'agent_alone'):\n"
