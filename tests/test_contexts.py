@@ -64,6 +64,7 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     assert [line["interpolation"] for line in contexts.measured(only_times=True)] == ["7", "4"]
 
 
+@pytest.mark.slow
 def test_recurrent_learners_remember(tmp_path, monkeypatch):
     monkeypatch.setattr(contexts, "RUNS", tmp_path)
     contexts.train("ppo_recurrent", 0, 2048)

@@ -237,6 +237,7 @@ def cells() -> dict[str, dict[str, float]]:
     }
 
 
+@pytest.mark.slow  # the first snippet of the README prints one of these costs
 def test_readme_table_is_what_the_demo_prints():
     shown = cells()
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")

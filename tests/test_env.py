@@ -1,8 +1,6 @@
 """The single environment against its specification, Gymnasium's checker and Stable-Baselines3's."""
 
 import re
-import subprocess
-import sys
 import warnings
 
 import gymnasium as gym
@@ -211,42 +209,7 @@ def test_global_random_state_is_left_alone():
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
 
 
-ROLLOUT = """
-import hashlib, gymnasium as gym, numpy as np, ikgym
-scenario = ikgym.scenarios.get("varga7-random").replace(plant=ikgym.Plant(noise=0.2), steps=50)
-env = gym.make("RedundantIK-v0", scenario=scenario)
-digest = hashlib.sha256()
-observation, _ = env.reset(seed=9)
-rng = np.random.default_rng(0)
-for _ in range(50):
-    observation, reward, *_ = env.step(rng.uniform(-1, 1, 7).astype(np.float32))
-    digest.update(b"".join(value.tobytes() for value in observation.values()) + np.float64(reward).tobytes())
-print(digest.hexdigest())
-"""
-
-
-def test_rollouts_are_the_same_in_a_fresh_process(capsys):
-    exec(ROLLOUT, {})
-    here = capsys.readouterr().out
-    there = subprocess.run([sys.executable, "-c", ROLLOUT], capture_output=True, text=True, check=True).stdout
-    assert here == there
-    assert len(here.strip()) == 64
-
-
-def test_importing_changes_no_global_state():
-    code = (
-        "import warnings, numpy as np, gymnasium, matplotlib, os\n"
-        "before = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
-        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
-        "import ikgym, baselines\n"
-        "after = (warnings.filters[:], np.geterr(), np.random.get_state()[1].tolist(), dict(os.environ),"
-        " dict(matplotlib.rcParams), gymnasium.logger.min_level)\n"
-        "assert before == after\n"
-        "import sys; assert 'matplotlib.pyplot' not in sys.modules and 'torch' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
+@pytest.mark.slow  # the environments by id have one that always runs
 def test_spawned_workers():
     envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
     try:
@@ -271,7 +234,7 @@ def test_ids_and_arguments():
 def test_bounds_are_true_at_the_worst(name):
     """Full speed from the farthest start, for the whole episode."""
     scenario = ikgym.scenarios.get(name)
-    changes = {"steps": min(scenario.steps, 400), "plant": ikgym.Plant(bias=0.5, noise=0.5)}
+    changes = {"steps": min(scenario.steps, 100), "plant": ikgym.Plant(bias=0.5, noise=0.5)}
     scenario = scenario.replace(**changes, obstacles=(), collisions=False)
     env = make(scenario, disable_env_checker=True)
     bound = scenario.start_bound()

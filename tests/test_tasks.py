@@ -23,10 +23,13 @@ def differences(function, q):
     return np.array([(function(q + shift) - function(q - shift)) / (2 * STEP) for shift in shifts]).T
 
 
-@pytest.mark.parametrize("task", ikgym.tasks.names())
 @pytest.mark.parametrize("arm", ikgym.arms.names())
-def test_jacobians_against_central_differences(arm, task):
-    arm, task = ikgym.arms.get(arm), ikgym.tasks.get(task)
+def test_jacobians_against_central_differences(arm):
+    for task in ikgym.tasks.names():
+        check_jacobians(ikgym.arms.get(arm), ikgym.tasks.get(task))
+
+
+def check_jacobians(arm, task):
     scale = TOLERANCE * (1 + arm.reach(np.full(arm.joints, 3.0)))
     other = np.random.default_rng(5)
     for q in configurations(arm):

@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[1]
 SOURCES = [*ROOT.glob("ikgym/**/*.py"), *ROOT.glob("baselines/**/*.py"), *ROOT.glob("benchmarks/**/*.py")]
 KERNELS = {"kernel", "inner", "uncounted", "inlined", "expanded", "njit"}
@@ -31,9 +29,10 @@ def _called(decorator: ast.expr) -> ast.expr:
     return decorator.func if isinstance(decorator, ast.Call) else decorator
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_all_but_kernels_have_types(path):
-    assert untyped(path.read_text(encoding="utf-8")) == []
+def test_all_but_kernels_have_types():
+    found = {str(path.relative_to(ROOT)): untyped(path.read_text(encoding="utf-8")) for path in SOURCES}
+    assert len(found) > 400
+    assert {path: names for path, names in found.items() if names} == {}
 
 
 def test_what_is_found():

@@ -218,9 +218,14 @@ def _linked(compiled: Any) -> Any:
 
 @functools.cache
 def _entry(compiled: Any) -> Any:
-    """A kernel that only calls another one, which has no wrapper for calls from Python."""
-    names = ", ".join(inspect.signature(compiled.py_func).parameters)
-    return njit(eval(f"lambda {names}: kernel({names})", {"kernel": compiled}))
+    """A kernel that only calls another one, which has no wrapper for calls from Python; kept on disk beside it."""
+    function = compiled.py_func
+    names = ", ".join(inspect.signature(function).parameters)
+    code = compile(f"lambda {names}: kernel({names})", function.__code__.co_filename, "eval")
+    entry = eval(code, {"kernel": compiled, "__name__": function.__module__})
+    entry.__qualname__ = f"{function.__qualname__}.entry"
+    # Kernels within functions may have one name and be different ones.
+    return kernel(entry) if _find(function.__module__, function.__qualname__, function) else njit(entry)
 
 
 def _has_arrays(kind: Any) -> bool:

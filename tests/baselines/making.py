@@ -31,6 +31,18 @@ def made(name, on, **parameters):
         pytest.skip(str(e))
 
 
+def two_actions(name):
+    """The last of two actions of a policy on its usual scenario."""
+    scenario = ikgym.scenarios.get(usual(name)).replace(steps=3)
+    policy, state = baselines.make(name, scenario), None
+    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
+    observation, _ = env.reset(seed=0)
+    for _ in range(2):
+        action, state = policy.predict(observation, state)
+        observation = env.step(action)[0]
+    return action.tolist()
+
+
 def circle(arm="panda", dt=2e-3, task="pose", speed=0.25, steps=400, **changes):
     """A circle of 10 cm in front of an arm, from its home; changes are those of the arm."""
     arm = ikgym.arms.get(arm).replace(**changes)

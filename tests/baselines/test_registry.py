@@ -3,9 +3,7 @@
 import dataclasses
 import functools
 import importlib.metadata
-import subprocess
 import sys
-import textwrap
 from typing import ClassVar
 
 import numpy as np
@@ -61,33 +59,6 @@ def entry_points(monkeypatch):
         monkeypatch.setattr(registry, "_entry_points", functools.cache(registry._entry_points.__wrapped__))
 
     return install
-
-
-def fresh_process(code):
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def test_names_import_no_policy_and_read_no_agent():
-    printed = fresh_process(
-        """
-        import sys
-        opened = []
-        sys.addaudithook(lambda event, args: opened.append(str(args[0])) if event == "open" else None)
-        import baselines
-        names = baselines.names()
-        assert "rhc" in names and "agent_alone" in names and "oracle" in names
-        print([m for m in sys.modules if m.startswith(("baselines.solvers", "baselines.agents", "baselines.oracle",
-            "baselines.evaluation", "matplotlib", "plotly", "torch", "ray", "minari", "h5py", "optuna"))])
-        print([file for file in opened if file.endswith(".safetensors")])
-        assert len(opened) > 10
-        assert not {"moviepy", "trimesh", "viser", "yourdfpy"} & set(sys.modules)
-        """
-    )
-    assert printed == "[]\n[]\n"
 
 
 @pytest.mark.parametrize("name", baselines.names())

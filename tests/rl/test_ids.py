@@ -54,7 +54,7 @@ def test_both_checkers_accept_it_without_a_warning(name):
     env = gym.make(name, render_mode="rgb_array")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(env.unwrapped)
+        check_env(env.unwrapped, skip_render_check="Track" not in name)
         check_env_of_sb3(env)
 
 
@@ -95,8 +95,10 @@ def test_seeds(name):
     assert env.unwrapped.np_random_seed == 7
 
 
-@pytest.mark.parametrize("mode", AutoresetMode)
-@every_id
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [*((name, AutoresetMode.NEXT_STEP) for name in IDS), *(("ikgym/Reach-v0", mode) for mode in [*AutoresetMode][1:])],
+)
 def test_native_vector_is_sync_of_singles_bit_for_bit(name, mode):
     native = gym.make_vec(name, N, autoreset_mode=mode)
     sync = gym.make_vec(name, N, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode})

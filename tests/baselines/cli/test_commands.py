@@ -247,32 +247,6 @@ def test_the_table_fits_the_terminal_and_the_readme_has_the_command(tmp_path, ca
     assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
 
-def test_a_command_imports_what_the_command_line_names():
-    code = (
-        "import sys\nfrom baselines.cli import main\nmain(['evaluate', '--policies', 'qp', '--steps', '5'])\n"
-        "print(*[name for name in sys.modules if '.' in name or name in ('torch', 'matplotlib', 'plotly', 'viser')])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT)
-    modules = done.stdout.splitlines()[-1].split()
-    assert not {"torch", "matplotlib", "plotly", "viser"} & set(modules)
-    others = ("agents", "viewer", "training", "papers", "tuning", "solvers.receding_horizon", "solvers.adaptive")
-    assert [name for name in modules if name.startswith(tuple(f"baselines.{one}" for one in others))] == []
-    solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}
-    shared = {"resolved_rate", "arm_task", "linear_algebra", "near_bodies", "surroundings"}
-    assert {"quadratic_program"} <= solvers <= {"quadratic_program", *shared}
-    assert {name for name in modules if name.startswith("baselines.cli.")} == {
-        "baselines.cli.commands",
-        "baselines.cli.commands.evaluate",
-        "baselines.cli.parsing",
-        "baselines.cli.shell",
-    }
-
-
-def test_no_list_loads_a_learning_library():
-    code = "import sys; from baselines.cli import main; main(['policies']); sys.exit('torch' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-
-
 def test_training_without_its_extra_says_which(tmp_path):
     """Also by `train.py`, which is the same command."""
     (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('no', name='torch')\n")

@@ -21,7 +21,7 @@ def compared(robot, path, capsys, *options):
     return {(solver, path): follows for solver, path, follows in rows}, text
 
 
-@pytest.mark.parametrize("robot", ["ur10", "baxter"])
+@pytest.mark.parametrize("robot", ["ur10", pytest.param("baxter", marks=pytest.mark.slow)])
 def test_a_short_path(robot, capsys, tmp_path):
     """The first points of the path in large steps."""
     lines = (FOLDER / f"{robot}.csv").read_text(encoding="utf-8").splitlines()

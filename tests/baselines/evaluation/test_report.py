@@ -251,13 +251,11 @@ def test_nothing_in_a_name_is_markup_in_the_readme():
 
 
 def test_plots_of_a_small_run(tmp_path):
-    """Accelerations are drawn where they have limits."""
-    names = ["cost-time.png", "joints-dls.png", "tracking.png", "velocities-dls.png"]
-    scenarios = [circle(steps=8).replace(name=r"$\no_formula{$"), "faitli3-regular"]
-    evaluate(scenarios, "dls", steps=8, out=tmp_path, report=False, plots=True)
+    names = ["accelerations-dls", "cost-time", "joints-dls", "tracking", "velocities-dls"]
+    scenario = circle(steps=8).replace(name=r"$\no_formula{$")
+    evaluate(scenario, "dls", steps=8, out=tmp_path, report=False, plots=True)
     made = sorted(file.relative_to(tmp_path / "plots").as_posix() for file in tmp_path.glob("plots/*/*"))
-    found = [("_no_formula_", ["accelerations-dls.png", *names]), ("faitli3-regular", names)]
-    assert made == [f"{folder}/{name}" for folder, some in found for name in some]
+    assert made == [f"_no_formula_/{name}.png" for name in names]
     linked = re.findall(r"!\[.*?\]\((.*?)\)", (tmp_path / "README.md").read_text(encoding="utf-8"))
     assert sorted(linked) == [f"plots/{name}" for name in made]
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in linked)
@@ -316,7 +314,6 @@ def log_of(steps=60, coordinates=6, joints=7, **changes):
 
 
 def assert_every_axis_has_a_label_and_a_unit(figure):
-    figure.draw_without_rendering()
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert all(re.search(r"\[.+\]$", label) for label in labels), labels
     assert any(axes.get_xlabel() == "time [s]" for axes in figure.axes)
@@ -329,6 +326,7 @@ def test_the_tracking_shows_errors_and_then_the_position(coordinates):
     assert_every_axis_has_a_label_and_a_unit(figure)
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels == ["position error [m]", "orientation error [rad]", "x [m]", "y [m]", "z [m]"]
+    figure.draw_without_rendering()
     heights = [axes.get_position().height for axes in figure.axes]
     assert max(heights) < 1.01 * min(heights)
     for axes, nominal in zip(figure.axes[2:], one["nominal"].T[-3:], strict=True):

@@ -257,6 +257,7 @@ def panda_spline(steps=100, **changes):
     return ikgym.Scenario("spline", **(fields | changes))
 
 
+@pytest.mark.slow
 def test_limits_of_acceleration_are_kept():
     """No cheaper path is known to IPOPT, and the plant holds nothing back."""
     scenario = panda_spline()

@@ -33,11 +33,12 @@ def test_starts_are_clear():
     found = starts(ideal(scenario))
     assert len(found) > 1
     assert (distances(scenario, found) > 0.0).all()
-    best = survey(scenario).best
+    surveyed = survey(scenario)
+    best = surveyed.best
     assert best.whole
     assert best.contact.clearance > 0.0
     assert not best.contact.touched
-    driven = retime(survey(scenario)).scenario
+    driven = retime(surveyed).scenario
     assert driven.obstacles == scenario.obstacles
     assert baselines.track(driven, "qp").position_error.max() < 1e-3
 

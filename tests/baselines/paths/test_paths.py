@@ -60,8 +60,9 @@ def test_another_start_drives_what_the_own_one_does_not():
 
 def test_a_start_that_is_given_is_kept_where_it_will_do():
     scenario = ikgym.scenarios.get("panda-square")
-    best = survey(scenario).best
-    other = next(b for b in survey(scenario).branches[1:] if b.whole and b.room.min() > 0.05 and b.slowing == 1.0)
+    found = survey(scenario)
+    best = found.best
+    other = next(b for b in found.branches[1:] if b.whole and b.room.min() > 0.05 and b.slowing == 1.0)
     assert not best.given
     given = survey(scenario.replace(start=other.start)).best
     assert given.given

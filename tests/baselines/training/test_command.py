@@ -46,6 +46,7 @@ def test_several_seeds(several, tmp_path, capsys):
     assert printed[1].split()[:2] == ["5", "–"]
 
 
+@pytest.mark.slow
 def test_a_seed_that_fails_does_not_end_the_others(several, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     assert main(["apg", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
@@ -54,7 +55,9 @@ def test_a_seed_that_fails_does_not_end_the_others(several, tmp_path, monkeypatc
     assert "   7  failed" in printed.out
     assert "error: seed 7: " in printed.err
     assert "--resume" in printed.err
-    monkeypatch.undo()
+
+
+def test_an_error_of_a_seed_is_said(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
     assert seeds.attempt(Seed(APG(), RunOptions(out=tmp_path), "", 3)).error == "ZeroDivisionError: division by zero"
     assert "Traceback" in capfd.readouterr().err
@@ -155,16 +158,7 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == 'error: Training needs tensorboard: pip install "ikgym[train]"\n'
 
 
-def test_the_command_line_is_read_without_torch():
-    """PyTorch takes seconds to load, and is an extra."""
-    code = (
-        "import sys; from baselines.cli.commands.train import parse\n"
-        "parse(['sac', '--env', 'ikgym/Track-v0', '--out', 'x']); assert 'torch' not in sys.modules"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-
-
+@pytest.mark.slow
 def test_from_the_shell(tmp_path):
     """As a program of its own, with warnings as errors."""
     arguments = [ROOT / "train.py", "apg", "--preset", "smoke", "--no-progress", "--out", "."]

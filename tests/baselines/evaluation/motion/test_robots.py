@@ -68,7 +68,7 @@ def played(file):
     return [name.partition(" [")[0] for name in head[1 : n + 1]], table[:, 0], table[:, 1 : n + 1], hardest
 
 
-@pytest.mark.parametrize("robot", CHAINS)
+@pytest.mark.parametrize("robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in [*CHAINS][1:])])
 def test_from_urdf_to_messages(robot, tmp_path):
     file = scenario_file(robot, tmp_path)
     words = ["--scenarios", str(file), "--policies", "qp", "--out", str(tmp_path / "out"), "--no-report"]

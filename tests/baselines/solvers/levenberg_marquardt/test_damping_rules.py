@@ -22,18 +22,6 @@ def now(rule, error=1.0, condition=1.0, stepped=np.nan, **numbers):
     return damping_now(law(rule, **numbers), error, condition, stepped)
 
 
-def test_constant():
-    assert now("constant", damping=0.25, error=7.0, condition=1e9) == 0.25
-    assert now("constant", damping=0.0) == 0.0
-
-
-def test_sugihara_and_chan():
-    """λ = ½ ω ‖e‖² + λ₀, and without λ₀."""
-    assert now("sugihara", error=4.0, weight=0.5, damping=0.1) == pytest.approx(4.1, rel=1e-15)
-    assert now("chan", error=4.0, weight=0.5) == 4.0
-    assert now("chan", error=0.0) == 0.0
-
-
 @pytest.mark.parametrize(("condition", "wanted"), [(1.0, 0.0), (9.9, 0.0), (10.0, 0.1), (99.0, 0.1), (np.inf, 0.5)])
 def test_condition(condition, wanted):
     """(37): each bound belongs to the interval behind it."""
@@ -47,16 +35,6 @@ def test_table(error, condition, wanted):
     """Table I: rows by the error, columns by the condition."""
     numbers = {"error_bounds": (1.0,), "condition_bounds": (10.0,), "dampings": ((0, 1), (2, 3))}
     assert now("table", error, condition, **numbers) == wanted
-
-
-@pytest.mark.parametrize(
-    ("error", "before", "wanted"), [(2.0, 1.0, 6.0), (1.0, 1.0, 0.5), (0.5, 1.0, 0.5), (9.0, np.inf, 0.5)]
-)
-def test_error_ratio(error, before, wanted):
-    """(14) with a₁ = 3, a₂ = 4 and λ = 2; an error as large as the one before is no rise."""
-    rule = law("error_ratio", damping=7.0, growth=3.0, decay=4.0)
-    assert damping_next(rule, 2.0, error, before) == wanted
-    assert damping_now(rule, error, 1.0, 2.0) == 2.0
 
 
 @pytest.mark.parametrize(
@@ -81,8 +59,8 @@ def test_only_stepped_rules_step_and_none_leaves_the_numbers(rule):
     made = law(rule)
     after = damping_next(made, 2.0, 5.0, 4.0)
     assert (after != 2.0) == (rule in ("error_ratio", "threshold"))
-    damping = 1.0
-    for _ in range(5000):
+    damping = 1e300
+    for _ in range(300):
         damping = damping_next(made, damping_now(made, 1e160, np.inf, damping), 1e160, 1e159)
     assert np.isfinite(damping)
 
