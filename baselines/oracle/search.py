@@ -68,14 +68,14 @@ def search(
     return finished(episode, starts, fine, done)
 
 
-def _known_paths(episode: EpisodeProblem, given: bool) -> dict[str, FloatArray]:
-    """Paths at full resolution that need no search; ``given`` is whether others are given besides."""
+def _known_paths(episode: EpisodeProblem, others: bool) -> dict[str, FloatArray]:
+    """Paths at full resolution that need no search; ``others`` is whether there are paths of policies besides."""
     scenario, seed, grid = episode.scenario, episode.seed, episode.grid
     out = {}
     nominal = scenario.nominal_joint_path(seed)
     if nominal is not None:
         out["nominal joint path"] = np.ascontiguousarray(nominal[grid.at])
-    if given and episode.clearance is not None:
+    if others and episode.clearance is not None:
         return out  # among bodies each path takes seconds, and a roll-out touches them
     rolled = np.empty((1, episode.knots, scenario.joints))
     local_search.random_paths(episode.on(grid), 0, rolled, 0, 1)
