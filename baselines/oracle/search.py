@@ -55,7 +55,7 @@ def search(
     """
     episode = EpisodeProblem.of(scenario, seed)
     done = tick or (lambda share: None)
-    known = _known_paths(episode)
+    known = _known_paths(episode, bool(paths))
     known |= {name: episode.through(q) for name, q in (paths or {}).items()}
     # Newton's method keeps the cheaper of a path and what it makes of it: no path may be cheap by passing a limit.
     known = {name: episode.feasible(path) for name, path in known.items()}
@@ -68,13 +68,15 @@ def search(
     return finished(episode, starts, fine, done)
 
 
-def _known_paths(episode: EpisodeProblem) -> dict[str, FloatArray]:
-    """Paths at full resolution that need no search."""
+def _known_paths(episode: EpisodeProblem, others: bool) -> dict[str, FloatArray]:
+    """Paths at full resolution that need no search; ``others`` is whether there are paths of policies besides."""
     scenario, seed, grid = episode.scenario, episode.seed, episode.grid
     out = {}
     nominal = scenario.nominal_joint_path(seed)
     if nominal is not None:
         out["nominal joint path"] = np.ascontiguousarray(nominal[grid.at])
+    if others and episode.clearance is not None:
+        return out  # among bodies each path takes seconds, and a roll-out touches them
     rolled = np.empty((1, episode.knots, scenario.joints))
     local_search.random_paths(episode.on(grid), 0, rolled, 0, 1)
     out["roll-out"] = rolled[0]

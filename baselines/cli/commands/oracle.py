@@ -84,6 +84,9 @@ Examples:
   {prog} --update
   {prog} --scenarios varga7-fast --policies rhc_foresight --update
   {prog} --test-sets varga7-pose-random --check
+  {prog} --test-sets panda-clutter-random --policies rhc_foresight --starts 10 --generations 0 --polished 1
+
+Among bodies, paths of policies replace the receding horizons that the search has of its own, and the roll-out.
 
 A line for each episode has: its cost and the kind of start that led to it; the norm of the gradient in [s/rad] or
 [s/m]; the number of paths at full resolution within a millionth of the cost; the number of random starts within 1 % of

@@ -16,8 +16,10 @@ GROWTH, LONGEST = 2.0, 100.0
 # Values of parameters that are None: for arms without limits, and with limits.
 FREE = {"horizon": 3001, "iterations": 1, "starts": 23, "restart_steps": 20, "start_steps": 10}
 LIMITED = {"iterations": 3, "starts": 1, "restart_steps": 0, "start_steps": 0}
-# Of arms with limits: how far ahead in [s], and the control period in [s] for which blocks have the lengths above.
-AHEAD, PERIOD = 1.5, 1e-3
+# Of arms with limits and among bodies: how far ahead in [s].
+AHEAD, AHEAD_AMONG_BODIES = 1.5, 3.0
+# Likewise the control period in [s] for which blocks have the lengths above.
+PERIOD = 1e-3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,10 +39,12 @@ class RecedingHorizonForesight(RecedingHorizon):
     in the far end of a plan that so few steps cannot settle, so that it looks 1.5 s ahead, at whatever control period;
     the lengths of its blocks are those of 1 ms in time, too, since the path turns as quickly for a slow controller.
 
-    **Among bodies** that may not touch, plans are made in the same way, for arms without limits, too.
+    **Among bodies** that may not touch, plans are made in the same way, for arms without limits, too, but look 3 s
+    ahead. On which side a body is passed is decided long before: in `panda-hand` a plan of 1.5 s has moved the null
+    space to the wrong side when the elbow comes into sight, and from there no better plan is near.
 
     Args:
-        horizon: As in ``rhc``. None for 3,001, and 1.5 s for arms with limits.
+        horizon: As in ``rhc``. None for 3,001; 1.5 s for arms with limits, 3 s among bodies.
         iterations: As in ``rhc``, where None is the optimum. Here it is 1, and 3 for arms with limits.
         move_blocks: As in ``rhc``, but None for blocks that are each 2 steps longer than the one before, up to 100; for
             arms with limits each 2 ms longer, up to 0.1 s.
@@ -61,7 +65,8 @@ class RecedingHorizonForesight(RecedingHorizon):
 
     def __post_init__(self) -> None:
         """Settles what depends on the arm."""
-        ahead = {"horizon": 1 + max(1, round(AHEAD / self.problem.dt))}
+        seconds = AHEAD_AMONG_BODIES if self.among_bodies else AHEAD
+        ahead = {"horizon": 1 + max(1, round(seconds / self.problem.dt))}
         for name, value in (LIMITED | ahead if self.interior_point else FREE).items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)

@@ -50,6 +50,16 @@ def test_a_path_that_touches_costs_without_end(free, ball):
     assert FREE.arm.clearance(found.q, [ball])[0].min() > 0.0
 
 
+def test_given_paths_replace_horizons_and_roll_out(free, ball):
+    scenario = FREE.replace(obstacles=[ball])
+    found = solve(scenario, SEED, QUICK, paths={"free": free.q})
+    kinds = {one.kind for one in found.starts}
+    assert "free" in kinds
+    assert "roll-out" not in kinds
+    assert not any(kind.startswith("rhc") for kind in kinds)
+    assert found.cost < 1.5 * free.cost
+
+
 def test_records_among_bodies_are_their_own(ball):
     scenario = FREE.replace(obstacles=[ball])
     moved = FREE.replace(obstacles=[ball.replace(radius=0.051)])
