@@ -29,10 +29,20 @@ OBSTACLES = [
 ]
 
 
+def among(*others):
+    """A Panda among all kinds of obstacles, and others."""
+    base = ikgym.scenarios.get("panda-circle")
+    obstacles = [*OBSTACLES, *others]
+    return base.replace(name="crowd", arm=base.arm.replace(bodies=LINKS), obstacles=obstacles, steps=1000)
+
+
+def person():
+    return Capsule("person", [0, 0.5, 0], [0, 0.5, 1], 0.1, motion=line([0.4, -0.3, 0], 0.5))
+
+
 @pytest.fixture(scope="module")
 def scenario():
-    base = ikgym.scenarios.get("panda-circle")
-    return base.replace(name="crowd", arm=base.arm.replace(bodies=LINKS), obstacles=OBSTACLES, steps=1000)
+    return among()
 
 
 def line(way, duration):
@@ -154,10 +164,9 @@ def test_an_arm_that_is_stopped_pays_to_the_end(scenario):
     assert max(rewards[first:]) < 0.0
 
 
-def test_one_arm_many_in_a_loop_and_many_at_once_agree(scenario):
-    moving = Capsule("person", [0, 0.5, 0], [0, 0.5, 1], 0.1, motion=line([0.4, -0.3, 0], 0.5))
+def test_one_arm_many_in_a_loop_and_many_at_once_agree():
     plant = Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
-    crowd = scenario.replace(obstacles=[*OBSTACLES, moving], plant=plant)
+    crowd = among(person()).replace(plant=plant)
     vectors = [
         gym.make_vec("RedundantIK-v0", num_envs=5, scenario=crowd, vectorization_mode=mode)
         for mode in ("sync", "vector_entry_point")
