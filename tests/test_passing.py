@@ -11,8 +11,9 @@ from tests.test_collisions import among, person
 
 CROWD = among(person())
 NAMES = [*ikgym.scenarios.names("bodies"), CROWD.name]
-#: Steps of all scenarios together; arms side by side; the distance in [m] below which the judge is called.
-MANY, ROWS, NEAR = 1_000_000, 50, 0.01
+#: Steps of all scenarios together; arms side by side; of each step the judge sees so many that are closest, if they are
+#: nearer than a distance in [m].
+MANY, ROWS, CLOSEST, NEAR = 1_000_000, 50, 4, 0.01
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -25,7 +26,7 @@ def test_no_arm_passes_through_a_body(name):
 def test_no_arm_passes_through_a_body_in_many_steps(name):
     lowest, stops = check(scenario_of(name), MANY // len(NAMES))
     assert lowest < 1e-3
-    assert stops > 10
+    assert stops > 0
 
 
 def scenario_of(name):
@@ -94,7 +95,9 @@ class Walk:
             self.seen, _, _, over, info = self.envs.step(wild.astype(np.float32))
             self.made, self.stopped, self.over = self.made + 1, info["collision"], over
             self.check_still(before, stopped)
-            near = np.flatnonzero((info["clearance"] < NEAR) & ~self.stopped)
+            distances = np.where(self.stopped, np.inf, info["clearance"])
+            near = np.argsort(distances)[:CLOSEST]
+            near = near[distances[near] < NEAR]
             ways.append((before[near], self.seen["q"][near]))
             places.append((around[near], self.around()[near]))
             clearances.append(info["clearance"][near])
