@@ -176,5 +176,6 @@ def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
 
 
 def _costs(episode: dict[str, Any]) -> dict[str, float]:
-    costs = {name: float(add_up(episode["infos"][name])) for name in ("tracking_cost", "velocity_cost")}
+    names = [name for name in ("tracking_cost", "velocity_cost", "proximity_cost") if name in episode["infos"]]
+    costs = {name: float(add_up(episode["infos"][name])) for name in names}
     return {"total_cost": float(add_up(-episode["rewards"])), **costs}

@@ -274,6 +274,8 @@ def _play(
             )
             if scenario.collides:
                 keep(record, {"clearance": out.clearance, "pair": out.pair, "stopped": out.stopped})
+            if scenario.proximity is not None:
+                keep(record, {"proximity_cost": out.proximity_cost})
             keep(diagnostics, policy.diagnostics(state))
             step += 1
             if tick is not None and step % TICK == 0:

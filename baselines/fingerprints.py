@@ -16,7 +16,7 @@ from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
 #: Fields of a scenario that change no result: its words, and what matters only where bodies may not touch.
-APART = {"name", "source", "obstacles", "collisions"}
+APART = {"name", "source", "obstacles", "collisions", "proximity"}
 #: Numbers in arrays, mostly of the order of 1, count up to here.
 DECIMALS = 12
 
@@ -30,6 +30,8 @@ def fingerprint(scenario: Scenario) -> str:
     parts = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario) if f.name not in APART}
     if scenario.collides:
         parts["collisions"] = [scenario.arm.bodies, scenario.obstacles]
+    if scenario.proximity is not None:
+        parts["proximity"] = scenario.proximity
     parts |= _of_plant(parts.pop("plant"))
     if scenario.start is None and not scenario.starts_nominally:
         parts["start"] = ["near home", scenario.arm.home]

@@ -53,6 +53,7 @@ class Episode:
         pair: The closest pair, and the one that touched where the arm stops, see
             :func:`ikgym.scenarios.contacts.pair_names`; -1 where nothing can meet. Shape (steps, 2).
         stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (steps,).
+        proximity_cost: Φ^C, 0 where the step does not count; None where the scenario has no such cost. Shape (steps,).
     """
 
     q: FloatArray
@@ -70,6 +71,13 @@ class Episode:
     clearance: FloatArray | None = None
     pair: FloatArray | None = None
     stopped: FloatArray | None = None
+    proximity_cost: FloatArray | None = None
+
+    @property
+    def cost(self) -> FloatArray:
+        """The stage costs. Shape (steps,)."""
+        cost: FloatArray = self.tracking_cost + self.velocity_cost
+        return cost if self.proximity_cost is None else cost + self.proximity_cost
 
 
 def add_up(costs: FloatArray) -> FloatArray:

@@ -58,7 +58,7 @@ def counted(scenario: Scenario, policy: str, seeds: Sequence[int], steps: int | 
 
 def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
     """Logarithms of 1 + cost of the last steps of episodes, None for all of them. Shape (episodes,)."""
-    return np.log1p([(one.tracking_cost + one.velocity_cost)[-(steps or 0) :].sum() for one in episodes])
+    return np.log1p([one.cost[-(steps or 0) :].sum() for one in episodes])
 
 
 def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:

@@ -189,7 +189,7 @@ def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]
             line = dict(old[number])
         else:
             played = rollouts(scenario, policy, seeds)
-            total = np.array([(one.tracking_cost + one.velocity_cost).sum() for one in played])
+            total = np.array([one.cost.sum() for one in played])
             first = total if first is None else first
             for name, ratios in {"cost_ratio": total / known, "times_every_step": total / first}.items():
                 prefix = "" if name == "cost_ratio" else f"{name}_"

@@ -11,7 +11,7 @@ import gymnasium as gym
 
 from ikgym import arms, exceptions, obstacles, problems, rl, scenarios, tasks, trajectories
 from ikgym.arms import Arm
-from ikgym.cost import TrackingCost
+from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import IkgymError
 from ikgym.kernels import rotations
@@ -23,6 +23,7 @@ __all__ = [
     "Arm",
     "IkgymError",
     "Plant",
+    "ProximityCost",
     "RedundantIKEnv",
     "RedundantIKVectorEnv",
     "Scenario",

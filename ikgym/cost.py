@@ -1,4 +1,4 @@
-"""The tracking cost, the score of every policy."""
+"""The tracking cost, the score of every policy, and the cost of proximity, which a scenario may add."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import cost as cost_kernels
+from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
 from ikgym.kernels.cost import CostParameters
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, float_array, number
 
@@ -125,6 +126,67 @@ class TrackingCost(Frozen):
         for row, target in zip(array.reshape(-1, array.shape[-1]), out.reshape(-1, array.shape[-1]), strict=True):
             kernel(self.parameters, row, target)
         return out
+
+
+@dataclasses.dataclass(frozen=True)
+class ProximityCost(Frozen):
+    """The cost of bodies that come near to each other or to obstacles, which joins the stage cost of a scenario.
+
+    With the smallest signed distance d of a step and the depth s = ``clearance`` − max(d, 0), ``Φ^C = (s / Δ)^P`` with
+    ``P_in`` inside ``s <= Δ`` and ``P_out`` outside; 0 where nothing is nearer than ``clearance``. Bodies that overlap
+    count as bodies that touch.
+
+    It is a part of the score. Solvers do not know it: those that minimise a stage cost, such as `rhc`, minimise Φ^X +
+    Φ^U, and keep their own distance from bodies. There is no best known cost with it.
+
+    Args:
+        clearance: The distance below which it costs anything, in [m]. From 1e-12 to 1e12.
+        delta: Δ, the depth that counts as 1, in [m]. From 1e-12 to 1e12.
+        p_out: The exponent of depths above Δ. From 1 to 100.
+        p_in: The exponent of depths up to Δ. From 1 to 100.
+
+    Raises:
+        InvalidInputError: A parameter is not within its bounds.
+    """
+
+    clearance: float
+    delta: float = 1e-2
+    p_out: float = 3.0
+    p_in: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in ("clearance", "delta"):
+            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
+        for name in ("p_out", "p_in"):
+            self._settle(**{name: number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT)})
+
+    @property
+    def parameters(self) -> ProximityParameters:
+        """The cost as its kernel sees it."""
+        return ProximityParameters(self.clearance, self.delta, self.p_out, self.p_in)
+
+    @property
+    def largest(self) -> float:
+        """The cost of bodies that touch; infinite where it exceeds all floats."""
+        depth = np.float64(self.clearance / self.delta)
+        with np.errstate(over="ignore"):
+            return float(depth ** (self.p_out if depth > 1.0 else self.p_in))
+
+    def value(self, distance: npt.ArrayLike) -> FloatArray | float:
+        """Φ^C of the smallest signed distance.
+
+        Args:
+            distance: In [m]. Shape (...).
+
+        Returns:
+            The cost, a float for one distance. Shape (...).
+
+        Raises:
+            InvalidInputError: The distance is no array of finite numbers.
+        """
+        array = float_array("distance", distance)
+        out = np.array([proximity(self.parameters, one) for one in array.ravel().tolist()])
+        return float(out[0]) if array.ndim == 0 else out.reshape(array.shape)
 
 
 def _rows(name: str, value: npt.ArrayLike) -> FloatArray:

@@ -85,8 +85,9 @@ class RedundantIKEnv(gym.Env[Any, Any]):
 
     ## Reward
     −(Φ^X(X^N(k+1) − F(q(k+1))) + Φ^U(q̇(k))), minus the stage cost of the scenario's `TrackingCost`, of the true joint
-    coordinates and the kinematics of the arm that moves; so are the errors in `info`. Where a
-    scenario holds its nominal points for several steps, only the last step of each point costs anything.
+    coordinates and the kinematics of the arm that moves; so are the errors in `info`. A scenario may add
+    a `ProximityCost` for bodies that come near. Where a scenario holds its nominal points for several steps, only the
+    last step of each point costs anything.
 
     ## Info
     | key | meaning | unit |
@@ -100,7 +101,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
     | `time` | time since the start | [s] |
 
     Where the scenario has collisions, `clearance` is the smallest signed distance between bodies in [m], and
-    `collision` is true for an arm that stands still since bodies touched.
+    `collision` is true for an arm that stands still since bodies touched. Where it has a `ProximityCost`,
+    `proximity_cost` is that of the clearance, Φ^C.
 
     After a reset `info` is empty, but for `context`, float64 (c,), where the plant draws numbers from ranges, see
     :class:`ikgym.Plant`: -1 at the lower end of a range, 1 at the upper end. No policy of the benchmark sees it.
@@ -244,14 +246,18 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         info["clipped"] = clipped > 0.0
         info["at_limit"] = held
         info["time"] = self._step * self._dt
+        cost = tracking + velocity
         if met:
             info["clearance"], info["collision"] = met[0], met[1] > 0.0
+            cost += met[2]
+        if self.scenario.proximity is not None:
+            info["proximity_cost"] = met[2]
         if self._pictures is not None:
             self._pictures.add(position, orientation)
         ends, over = self.lost_distance is not None, self._step == self._steps
         lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over
-        return seen, -(tracking + velocity), lost, over, info
+        return seen, -cost, lost, over, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draws the arm, the nominal and the actual path, and the error over time.

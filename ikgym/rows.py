@@ -100,6 +100,8 @@ def infos_of(out: Outcome, rows: BoolArray, made: npt.NDArray[np.int64], scenari
         infos["at_limit"] += (out.at_limit * rows[:, None]).astype(np.int64)
     if scenario.collides:
         infos["clearance"], infos["collision"] = np.where(rows, out.clearance, 0.0), (out.stopped > 0.0) & rows
+    if scenario.proximity is not None:
+        infos["proximity_cost"] = np.where(rows, out.proximity_cost, 0.0)
     for key in tuple(infos):
         infos[f"_{key}"] = rows.copy()
     return infos

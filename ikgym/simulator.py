@@ -96,8 +96,8 @@ class Simulator:
         self._told, self._held = slice(usual - 8, usual - 3), slice(usual - 3, usual)
         # Places in the block of the parts of an observation: those always there, and the others with their shapes.
         numbered = self._outcome(np.arange(self._count, dtype=np.float64))
-        seen, met = observation(numbered, 0), (numbered.clearance, numbered.stopped) if scenario.collides else ()
-        self._met = [int(part[0]) for part in met]
+        seen, met = observation(numbered, 0), (numbered.clearance, numbered.stopped, numbered.proximity_cost)
+        self._met = [int(part[0]) for part in met] if scenario.collides else []
         places = {key: slice(int(part.flat[0]), int(part.flat[-1]) + 1) for key, part in seen.items()}
         self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
         self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
@@ -217,7 +217,7 @@ class Simulator:
 
         Returns:
             The observation, without a row axis; costs, errors and whether the action was clipped; joints held back;
-            where bodies can touch, the clearance in [m], and 1 for an arm that is stopped, else nothing.
+            where bodies can touch, the clearance in [m], 1 for an arm that is stopped, and Φ^C, else nothing.
         """
         self._accept(action, self._all)
         numbers = np.empty(self._count)

@@ -192,7 +192,7 @@ class RedundantIKVectorEnv(
             )
         stepping = ~waiting
         out = self._simulator.step(actions, stepping)
-        rewards = -(out.tracking_cost + out.velocity_cost)
+        rewards = -out.cost
         rewards[waiting] = 0.0
         made = self._simulator.steps_made
         over = stepping & (made == self.scenario.steps)

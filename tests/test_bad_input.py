@@ -62,6 +62,7 @@ GOOD = (
     RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2, 0.2], ignored=("hand",)),
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
+    ikgym.ProximityCost(0.1),
     Plant(zero=1e-3, bandwidth=10.0, command_delay=2, arms=(ARM,)),
     Sinusoid(0.1 * ONES, frequency=ONES, phase=ONES / 3, offset=ONES, sigmoid=0.7),
     RandomSinusoid(0.1 * ONES),
@@ -152,7 +153,8 @@ def test_bad_values_of_fields_are_refused_in_one_line(good):
 
 def test_every_kind_of_part_is_in_the_table():
     kinds = {kind for family in (KINDS, PATHS, TIME_LAWS, ORIENTATIONS, OBSTACLES) for kind in family.values()}
-    assert kinds == {type(one) for one in GOOD} - {ikgym.Arm, Bodies, ikgym.Scenario, ikgym.TrackingCost, Plant}
+    costs = {ikgym.TrackingCost, ikgym.ProximityCost}
+    assert kinds == {type(one) for one in GOOD} - {ikgym.Arm, Bodies, ikgym.Scenario, Plant} - costs
     assert {JointSpline, ikgym.Scenario} <= {type(one) for one in GOOD}
 
 
@@ -230,6 +232,10 @@ REFUSED = [
     ("an arm with bodies, 'panda' has none", lambda: around(Sphere("a", [9, 0, 0], 0.1), bodies=Bodies())),
     ("an arm with bodies, 'panda' has none", lambda: around(bodies=Bodies(), collisions=True)),
     *(("collisions", lambda x=x: around(collisions=x)) for x in (1, "yes", np.nan)),
+    ("with collisions, got one without", lambda: PANDA_LINE.replace(proximity=ikgym.ProximityCost(0.1))),
+    ("ProximityCost or None", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=0.1)),
+    ("cost of at most", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=ikgym.ProximityCost(1, 1e-12, 100))),
+    *(("distance", lambda x=x: ikgym.ProximityCost(0.1).value(x)) for x in (np.nan, [np.inf], "a", None)),
     ("d of arm", lambda: dh(a=[1, 2])),
     ("alpha", lambda: dh(alpha=[np.nan])),
     ("row", lambda: dh(a=[], d=[], alpha=[])),

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ikgym import TrackingCost
+from ikgym import ProximityCost, TrackingCost
 from ikgym.kernels import cost as cost_kernels
 
 COSTS = [
@@ -62,6 +62,16 @@ def test_batches_and_compiled_against_plain_python():
     for index in np.ndindex(4, 5):
         assert values[index] == cost.tracking(errors[index])
         assert values[index] == cost_kernels.tracking.py_func(cost.parameters, errors[index])
+
+
+@pytest.mark.parametrize("near", [ProximityCost(0.05), ProximityCost(0.03, 0.07, 1.5, 4.0)])
+@given(distance=st.floats(-0.02, 0.08))
+def test_proximity_is_the_formula(near, distance):
+    depth = near.clearance - max(distance, 0.0)
+    expected = printed([depth], near.delta, near.p_in, near.p_out) if depth > 0.0 else 0.0
+    assert near.value(distance) == pytest.approx(expected, rel=1e-12)
+    assert near.value(distance) <= near.largest == near.value(0.0) == near.value(-1.0)
+    np.testing.assert_array_equal(near.value([[distance, 9.0]]), [[near.value(distance), 0.0]])
 
 
 # What the kernels gave under the present version: errors and velocities, then values and derivatives of two costs.

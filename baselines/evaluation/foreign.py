@@ -174,6 +174,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
             # Copies: wrappers may write into the arrays that they receive.
             copies = [seen[key].copy() for key in ("q", "qdot", "pose")]
             numbers += [info.get("clearance", math.nan), info.get("collision", False)]  # likewise
+            numbers.append(info.get("proximity_cost", 0.0))
             self.rows.append((*copies, *map(np.asarray, numbers), info["at_limit"].astype(np.float64)))
         return result
 
@@ -218,10 +219,12 @@ def play_wrapped(
     if tick is not None:
         tick(scenario.steps)
     columns = map(np.array, zip(*recorder.rows, strict=True))
-    q, qdot, pose, tracking, velocity, position, orientation, clearance, stopped, at_limit = columns
+    q, qdot, pose, tracking, velocity, position, orientation, clearance, stopped, near, at_limit = columns
     met = {"clearance": clearance, "stopped": stopped}
     if scenario.collides:
         met["pair"] = _pairs(scenario, seeds.seed, q)
+    if scenario.proximity is not None:
+        met["proximity_cost"] = near
     return Episode(
         q,
         qdot,

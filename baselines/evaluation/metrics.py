@@ -92,6 +92,7 @@ class Row:
         closest_pair: The names of the two bodies that were closest, or that stopped the arm.
         closest_step: The step in which they were, from 1.
         stopped: The step of the stop, from 1; None also if the arm was not stopped.
+        proximity_cost: The part Φ^C; None where the scenario has no such cost.
     """
 
     scenario: str
@@ -138,6 +139,7 @@ class Row:
     closest_pair: list[str] | None = None
     closest_step: int | None = None
     stopped: int | None = None
+    proximity_cost: float | None = None
 
     @property
     def lost(self) -> bool:
@@ -205,7 +207,7 @@ def measure(
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
     path = path_scores(scenario, seeds, episode)
     episode = first_steps(episode, scenario.steps)
-    total = float(add_up(episode.tracking_cost + episode.velocity_cost))
+    total = float(add_up(episode.cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
     angles = episode.orientation_error[counted] if scenario.task.has_orientation else None

@@ -68,9 +68,14 @@ class Tracking:
     _played: tuple[Scenario, Seeds, Episode] = dataclasses.field(repr=False)
 
     @property
+    def cost(self) -> FloatArray:
+        """−reward, step by step: Φ^X, Φ^U and, where the scenario has it, Φ^C. Shape (steps,)."""
+        return self._played[2].cost
+
+    @property
     def total_cost(self) -> float:
         """Sum of −reward, as in the row of an evaluation."""
-        return float(add_up(self.tracking_cost + self.velocity_cost))
+        return float(add_up(self.cost))
 
     @property
     def motion(self) -> Motion:
@@ -95,6 +100,8 @@ class Tracking:
         out["orientation_error [rad]"] = self.orientation_error
         out["tracking_cost [1]"] = self.tracking_cost
         out["velocity_cost [1]"] = self.velocity_cost
+        if (near := self._played[2].proximity_cost) is not None:
+            out["proximity_cost [1]"] = near
         out["solver_status"] = np.array([Status(status).label for status in self.statuses.tolist()])
         return out
 

@@ -61,7 +61,7 @@ class EpisodeProblem:
 
         Raises:
             InvalidInputError: The seed is no whole number of at least 0, or the scenario's plant is not ideal, or it
-                has both limits of acceleration and points that are held.
+                has a cost of proximity, or both limits of acceleration and points that are held.
         """
         whole_number("seed", seed, at_least=0)
         payload = {name: getattr(scenario.plant, name) for name in ("payload", "payload_step")}
@@ -69,6 +69,11 @@ class EpisodeProblem:
             raise InvalidInputError(
                 "The best cost of an episode is that of a joint path of the arm in the data sheet; scenario "
                 f"{scenario.name!r}: expected an ideal plant, but for a payload, got {scenario.plant}."
+            )
+        if scenario.proximity is not None:
+            raise InvalidInputError(
+                "The search minimises tracking and velocity costs alone; scenario "
+                f"{scenario.name!r}: expected no proximity, got {scenario.proximity}."
             )
         limited = bool(np.isfinite(scenario.arm.acceleration_limit).any())
         if limited and not scenario.counted()[1:].all():
@@ -178,7 +183,7 @@ class EpisodeProblem:
         played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
         q, costs, stopped = np.empty_like(qdot), np.empty(len(qdot)), False
         for k, out in enumerate(played):
-            q[k], costs[k] = out.true_q[0], out.tracking_cost[0] + out.velocity_cost[0]
+            q[k], costs[k] = out.true_q[0], out.cost[0]
             stopped = stopped or bool(out.stopped.any())
         return q, np.inf if stopped else float(add_up(costs))
 

@@ -68,7 +68,13 @@ def ideal(scenario: Scenario, **changes: object) -> Scenario:
     """The scenario on an arm as in the data sheet, over its whole path."""
     dt = changes.get("dt", scenario.dt)
     steps = int(np.ceil(path_duration(scenario.replace(**changes)) / dt - 1e-9))  # type: ignore[operator]
-    usual = {"plant": Plant(), "initial_pose": None, "iterations_per_point": 1, "cost": TrackingCost()}
+    usual = {
+        "plant": Plant(),
+        "initial_pose": None,
+        "iterations_per_point": 1,
+        "cost": TrackingCost(),
+        "proximity": None,
+    }
     return scenario.replace(**{"model": scenario.arm, **usual, "steps": max(steps, 2), **changes})
 
 

@@ -110,7 +110,7 @@ def score(policy: Any, scenario: Scenario, episodes: int, preview: Preview) -> S
 
     costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
     for k, out in enumerate(play(scenario, seeds, act, preview=preview)):
-        costs[:, k] = out.tracking_cost + out.velocity_cost
+        costs[:, k] = out.cost
         errors = np.maximum(errors, out.position_error)
         if scenario.task.has_orientation:
             angles = np.maximum(angles, out.orientation_error)
@@ -146,7 +146,7 @@ def record_of(scenario: Scenario, seeds: Sequence[int]) -> dict[str, Any]:
     """The costs of the reference policy on some episodes, as the file has them."""
     name, parameters = parse_policy(POLICY)
     episodes = rollouts(scenario, registry.make(name, scenario, **parameters), seeds)
-    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
+    costs = [float(np.sum(e.cost)) for e in episodes]
     return {
         "scenario": scenario.name,
         "task": scenario.task.name,

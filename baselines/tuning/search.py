@@ -70,7 +70,7 @@ class Search:
     def costs(self, settings: Mapping[str, Any], seeds: Sequence[int]) -> list[float]:
         """The total costs of episodes with some settings."""
         played = rollouts(self.scenario, self.make(settings), seeds)
-        return [float(add_up(one.tracking_cost + one.velocity_cost)) for one in played]
+        return [float(add_up(one.cost)) for one in played]
 
     def make(self, settings: Mapping[str, Any]) -> Any:
         """The solver with some settings.

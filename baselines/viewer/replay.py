@@ -139,7 +139,7 @@ def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
         made = baselines.track(stage.scenario, policy, seed=stage.seed)
         position = np.append(stage.errors[0], made.position_error)
         orientation = np.append(stage.errors[1], made.orientation_error)
-        cost = np.append(0.0, np.cumsum(made.tracking_cost + made.velocity_cost))
+        cost = np.append(0.0, np.cumsum(made.cost))
         statuses = np.append(made.statuses[:1], made.statuses)
         replays.append(Replay(policy, made.motion.q, position, orientation, cost, statuses))
     return replays

@@ -37,6 +37,8 @@ class Outcome(NamedTuple):
         stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (N,).
         pair: The nearest pair: a body, and another body or the number of bodies plus that of an obstacle; the pair that
             touched at the step of a stop; -1 where nothing can meet. Shape (N, 2).
+        proximity_cost: Φ^C, 0 where the step does not count. Shape (N,), or (N, 0) where bodies cannot touch and the
+            plant is ideal.
         obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`.
             Shape (N, o, 16), or (N, 0, 16) where they are always the same.
     """
@@ -61,7 +63,14 @@ class Outcome(NamedTuple):
     clearance: Floats
     stopped: Floats
     pair: Floats
+    proximity_cost: Floats
     obstacles: Floats
+
+    @property
+    def cost(self) -> Floats:
+        """The stage cost: Φ^X, Φ^U and Φ^C. Shape (N,)."""
+        cost = self.tracking_cost + self.velocity_cost
+        return cost + self.proximity_cost if self.proximity_cost.size else cost
 
 
 #: The observation, see :func:`observation`.
@@ -86,7 +95,7 @@ def outcome(
     One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
 
     Args:
-        numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m + 4 + 16 o),)
+        numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m + 5 + 16 o),)
             where the plant is not ideal or bodies can touch.
         rows: N.
         n: Joints of the arm.
@@ -100,13 +109,13 @@ def outcome(
     nothing = numbers[:0].reshape(rows, 0)
     if h is None:
         empty = nothing, nothing, nothing.reshape(rows, 0, n)
-        unknown = nothing, nothing, nothing, nothing.reshape(rows, 0, OBSTACLE)
+        unknown = nothing, nothing, nothing, nothing, nothing.reshape(rows, 0, OBSTACLE)
         return Outcome._make((numbers, *shown, *empty, shown[0], shown[2], *unknown))
-    *ages, commands, q, pose, clearance, stopped, pair, obstacles = more_parts(
+    *ages, commands, q, pose, clearance, stopped, pair, near, obstacles = more_parts(
         numbers[rows * size(n, m, p) :], rows, n, m, h, o
     )
     measured = (*(ages if late else (nothing, nothing)), commands)
-    return Outcome._make((numbers, *shown, *measured, q, pose, clearance, stopped, pair, obstacles))
+    return Outcome._make((numbers, *shown, *measured, q, pose, clearance, stopped, pair, near, obstacles))
 
 
 def size(n: int, m: int, p: int) -> int:
@@ -116,7 +125,7 @@ def size(n: int, m: int, p: int) -> int:
 
 def more_size(n: int, m: int, h: int, o: int) -> int:
     """Numbers that a row shows besides where the plant is not ideal, or bodies can touch."""
-    return 2 + h * n + n + m + 4 + OBSTACLE * o
+    return 2 + h * n + n + m + 5 + OBSTACLE * o
 
 
 def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, ...]:
@@ -147,7 +156,7 @@ def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> tu
     true_q = commands + rows * h * n
     true_pose = true_q + rows * n
     clearance = true_pose + rows * m
-    obstacles = clearance + 4 * rows
+    obstacles = clearance + 5 * rows
     return (
         numbers[:rows].reshape(rows, 1),
         numbers[rows:commands].reshape(rows, 1),
@@ -156,6 +165,7 @@ def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> tu
         numbers[true_pose:clearance].reshape(rows, m),
         numbers[clearance : clearance + rows],
         numbers[clearance + rows : clearance + 2 * rows],
-        numbers[clearance + 2 * rows : obstacles].reshape(rows, 2),
+        numbers[clearance + 2 * rows : clearance + 4 * rows].reshape(rows, 2),
+        numbers[clearance + 4 * rows : obstacles],
         numbers[obstacles : obstacles + rows * o * OBSTACLE].reshape(rows, o, OBSTACLE),
     )

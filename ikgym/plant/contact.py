@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from ikgym.kernels.bodies import Floats, Integers, Shapes, place, smallest
+from ikgym.kernels.bodies.proximity import ProximityParameters
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.random_numbers import stream
 from ikgym.kernels.simulation import Flags
@@ -29,6 +30,7 @@ class Contacts(NamedTuple):
             Shape (N or 1, steps + 2 or 1, o, 16).
         drift: How far an obstacle moves at most in the step after so many, in [m]. Shape (steps + 2 or 1,).
         shown: Obstacles that observations show: o or 0.
+        proximity: The shape of its cost.
         starts: In the frames of the links, without the payload and with it, in [m]. Shape (N, 2, k, 3).
         ends: The same. Shape (N, 2, k, 3).
         distance: Smallest signed distance in [m]. Shape (N,).
@@ -51,6 +53,7 @@ class Contacts(NamedTuple):
     boxes: Floats
     drift: Floats
     shown: int
+    proximity: ProximityParameters
     starts: Floats
     ends: Floats
     distance: Floats

@@ -8,6 +8,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.kernels.bodies import OBSTACLE, PLACED, Surroundings
+from ikgym.kernels.bodies.proximity import ProximityParameters
 from ikgym.kernels.random_numbers import CUT
 from ikgym.plant.contact import Contacts
 from ikgym.plant.plant import Plant
@@ -15,7 +16,14 @@ from ikgym.validation import FloatArray
 
 
 def contact_rows(
-    arm: Arm, plant: Plant, around: Surroundings, boxes: FloatArray, travel: FloatArray, rows: int, shown: bool
+    arm: Arm,
+    plant: Plant,
+    around: Surroundings,
+    boxes: FloatArray,
+    travel: FloatArray,
+    rows: int,
+    shown: bool,
+    proximity: ProximityParameters,
 ) -> Contacts:
     """Bodies and obstacles of N arms.
 
@@ -27,6 +35,7 @@ def contact_rows(
         travel: Largest absolute joint coordinates in [rad] or [m]. Shape (n,).
         rows: N.
         shown: Whether observations show the obstacles.
+        proximity: The shape of its cost.
     """
     shapes, n = arm.bodies.shapes, arm.joints
     bodies, obstacles = len(shapes.links), boxes.shape[2]
@@ -40,6 +49,7 @@ def contact_rows(
         boxes=boxes,
         drift=drift(boxes[0], arm.reach(travel)),
         shown=obstacles if shown else 0,
+        proximity=proximity,
         starts=np.tile(shapes.starts, (rows, 2, 1, 1)),
         ends=np.tile(shapes.ends, (rows, 2, 1, 1)),
         distance=np.full(rows, np.inf),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ikgym.kernels.bodies.proximity import proximity
 from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
@@ -135,9 +136,9 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown,
         )
         if contacts is not None:
             _meet(contacts, chain, row, loaded, k, moving, k == drives.payload_step, q, qdot, plant.drive)
-            _show_contacts(contacts, row, k, more)
+            _show_contacts(contacts, row, k, constants.counted[k], more)
         else:
-            more[5][row], more[6][row], more[7][row, 0], more[7][row, 1] = math.inf, 0.0, -1.0, -1.0
+            more[5][row], more[6][row], more[7][row, 0], more[7][row, 1], more[8][row] = math.inf, 0.0, -1.0, -1.0, 0.0
         forward(chain, q[row], rotation, position)
         show_row(constants, cost, state, row, more[4][row], (rotation, position, nominal, error), shown)
         for j in range(n):
@@ -169,15 +170,16 @@ def _meet(contacts, chain, row, loaded, k, moving, loading, q, qdot, drive):
 
 
 @inlined
-def _show_contacts(contacts, row, k, more):
-    """Shows the clearance of a row, whether it is stopped, its nearest pair, and the obstacles that it shall see."""
+def _show_contacts(contacts, row, k, counted, more):
+    """Shows the clearance of a row, what it costs, whether the row is stopped, its nearest pair, and its obstacles."""
     more[5][row], more[6][row] = contacts.distance[row], contacts.stopped[row]
+    more[8][row] = proximity(contacts.proximity, contacts.distance[row]) if counted else 0.0
     for c in range(2):
         more[7][row, c] = contacts.pair[row, c]
     table, at = place_of_boxes(contacts, row, k + 1)
     for i in range(contacts.shown):
         for c in range(OBSTACLE):
-            more[8][row, i, c] = contacts.boxes[table, at, i, c]
+            more[9][row, i, c] = contacts.boxes[table, at, i, c]
 
 
 @inlined

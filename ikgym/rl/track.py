@@ -90,13 +90,15 @@ class DistanceStage(Stage):
 
     def __init__(self, env: Any, radian: float = 1.0, zero: float = 0.1) -> None:
         self._scales = number("radian", radian, at_least=0.0), UNIT, number("zero", zero, above=0.0)
-        self._oriented = env.unwrapped.scenario.task.has_orientation
+        scenario = env.unwrapped.scenario
+        self._oriented, self._near = scenario.task.has_orientation, scenario.proximity is not None
 
     def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
-        """Rewards 1 − log(1 + (d / 1 mm)² + Φ^U) / log(1 + (D / 1 mm)²)."""
+        """Rewards 1 − log(1 + (d / 1 mm)² + Φ^U + Φ^C) / log(1 + (D / 1 mm)²)."""
         out, position = np.empty(len(rewards)), told("position_error")
         orientation = told("orientation_error") if self._oriented else np.zeros(len(rewards))
-        distance_rewards(self._scales, position, orientation, told("velocity_cost"), out)
+        others = told("velocity_cost") + told("proximity_cost") if self._near else told("velocity_cost")
+        distance_rewards(self._scales, position, orientation, others, out)
         return out
 
 

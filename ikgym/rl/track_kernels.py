@@ -52,18 +52,18 @@ def track_rows(kind, chain, scales, home, units, fastest, q, qdot, pose, nominal
 
 
 @kernel
-def distance_rewards(scales, position, orientation, velocity_cost, out):
+def distance_rewards(scales, position, orientation, others, out):
     """Rewards of N rows, see :class:`ikgym.rl.DistanceReward`.
 
     Args:
         scales: Weight of 1 rad in [m], unit of distances and distance without reward in [m].
         position: Position errors in [m]. Shape (N,).
         orientation: Orientation errors in [rad]. Shape (N,).
-        velocity_cost: Φ^U. Shape (N,).
+        others: The other costs of the step. Shape (N,).
         out: Receives the rewards. Shape (N,).
     """
     radian, unit, zero = scales
     most = math.log1p((zero / unit) ** 2)
     for row in range(out.shape[0]):
         square = (position[row] / unit) ** 2 + (radian * orientation[row] / unit) ** 2
-        out[row] = 1.0 - math.log1p(square + velocity_cost[row]) / most
+        out[row] = 1.0 - math.log1p(square + others[row]) / most

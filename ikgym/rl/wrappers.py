@@ -127,9 +127,9 @@ class ShareAction(ArmWrapper):
 
 
 class DistanceReward(ArmWrapper):
-    """Rewards of size 1 from the true errors and the cost of velocities.
+    """Rewards of size 1 from the true errors and the costs of velocities and, where the scenario has it, proximity.
 
-        reward = 1 − log(1 + (d / 1 mm)² + Φ^U) / log(1 + (D / 1 mm)²)
+        reward = 1 − log(1 + (d / 1 mm)² + Φ^U + Φ^C) / log(1 + (D / 1 mm)²)
         d² = (position error)² + (L · orientation error)²
 
     With L = 1 m, Δx = 1 mm and P_X = 2 this is 1 − log(1 + stage cost) / log(1 + (D / 1 mm)²). It is negative beyond D.

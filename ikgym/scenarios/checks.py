@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ikgym.arms import Arm
-from ikgym.cost import TrackingCost
+from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.memory import check_memory, gib
@@ -57,7 +57,8 @@ def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 
     Raises:
         InvalidInputError: They are no sequence of obstacles with different names, there are too many, the arm has no
-            bodies where touching matters, or one is drawn beside a path that is no random joint motion.
+            bodies where touching matters, one is drawn beside a path that is no random joint motion, or the cost of
+            proximity is none or without collisions.
         UnknownNameError: One ignores a body that there is not.
     """
     name, arm, given, collisions = (fields[key] for key in ("name", "arm", "obstacles", "collisions"))
@@ -84,7 +85,18 @@ def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
     matters = bool(given) if collisions is None else flag("collisions", collisions)
     if matters and not len(arm.bodies):
         raise InvalidInputError(f"collisions of scenario {name!r}: expected an arm with bodies, {arm.name!r} has none.")
+    _check_proximity(name, fields["proximity"], matters)
     return tuple(given)
+
+
+def _check_proximity(name: str, cost: Any, matters: bool) -> None:
+    if cost is not None and not isinstance(cost, ProximityCost):
+        raise InvalidInputError(f"proximity of scenario {name!r}: expected ProximityCost or None, got {cost!r}.")
+    if cost is not None and not matters:
+        raise InvalidInputError(
+            f"proximity of scenario {name!r}: expected a scenario with collisions, got one without; they are switched "
+            "on by obstacles, or by collisions = true."
+        )
 
 
 def step_count(name: str, value: int, joints: int) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies.proximity import OFF
 from ikgym.kernels.outcome import Outcome
 from ikgym.plant.contact import Contacts
 from ikgym.plant.contact_rows import contact_rows
@@ -32,8 +33,9 @@ def plant_rows(scenario: Scenario, rows: int, commands: int) -> PlantRows:
 def contacts_of(scenario: Scenario, rows: int) -> Contacts:
     """Bodies and obstacles of N arms in a scenario with collisions."""
     boxes = np.tile(scenario.obstacle_rows(scenario.steps + 2), (rows if scenario.draws_obstacles else 1, 1, 1, 1))
-    around, travel = scenario.surroundings, scenario.joint_bound()
-    return contact_rows(scenario.arm, scenario.plant, around, boxes, travel, rows, scenario.obstacles_shown)
+    around, travel, shown = scenario.surroundings, scenario.joint_bound(), scenario.obstacles_shown
+    near = OFF if scenario.proximity is None else scenario.proximity.parameters
+    return contact_rows(scenario.arm, scenario.plant, around, boxes, travel, rows, shown, near)
 
 
 def draw_obstacles(

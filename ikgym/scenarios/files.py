@@ -17,7 +17,7 @@ from ikgym import arms, files, tasks
 from ikgym.arms import Arm
 from ikgym.arms.bodies import Bodies
 from ikgym.arms.checks import numbered_joints
-from ikgym.cost import TrackingCost
+from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import Obstacle
@@ -40,7 +40,7 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
     Orientation: ORIENTATIONS,
     Obstacle: OBSTACLES,
 }
-PARTS = (Arm, Bodies, Task, TrackingCost, Plant, *CHOICES)
+PARTS = (Arm, Bodies, Task, TrackingCost, ProximityCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.
 TEXTS = {str, type(None), os.PathLike[str]}
 #: Annotations of lists that hold no numbers.

@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
-from ikgym.cost import TrackingCost
+from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.obstacles import Obstacle
@@ -55,6 +55,7 @@ class Scenario(Frozen, Surrounded):
         obstacles: What stands or moves around the arm, at most 1000, with different names.
         collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
             By default it is where there are obstacles.
+        proximity: The cost of bodies that come near, in a scenario with collisions; none by default.
         source: Origin of the scenario.
 
     Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
@@ -78,6 +79,7 @@ class Scenario(Frozen, Surrounded):
     plant: Plant = dataclasses.field(default_factory=Plant)
     obstacles: Sequence[Obstacle] = ()
     collisions: bool | None = None
+    proximity: ProximityCost | None = None
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -258,7 +260,8 @@ class Scenario(Frozen, Surrounded):
         else:
             nominal = trajectory.reach(self.times(int(self.points()[-1]) + 1), self.model)
         distance = self.plant.reach(self.arm, self.joint_bound()) + nominal
-        return checks.largest_step_cost(self.task, self.cost, self.velocity_limit, distance)
+        largest = checks.largest_step_cost(self.task, self.cost, self.velocity_limit, distance)
+        return largest if self.proximity is None else largest + self.proximity.largest
 
     def start_bound(self) -> FloatArray:
         """Absolute joint coordinates that no start exceeds, in [rad] or [m]. Shape (n,)."""

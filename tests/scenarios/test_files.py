@@ -97,7 +97,8 @@ WHOLE = Scenario(
     ),
     source="a test",
     obstacles=OBSTACLES,
-    collisions=False,
+    collisions=True,
+    proximity=ikgym.ProximityCost(1 / 3, 1e-3, 2.5, 1.5),
 )
 
 

@@ -58,7 +58,8 @@ def _bodies(scenario: Scenario) -> dict[str, object]:
         return {}
     count = "an arm that touches something is stopped" if scenario.collides else "do not count"
     own = {"bodies": f"{len(bodies)} on the arm, {len(bodies.pairs)} pairs of which can meet"} if len(bodies) else {}
-    return {**own, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count}
+    near = {} if scenario.proximity is None else {"proximity": scenario.proximity}
+    return {**own, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count, **near}
 
 
 def _accelerations(arm: Arm) -> str:

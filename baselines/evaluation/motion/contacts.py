@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from baselines.recording import Episode
+from baselines.recording import Episode, add_up
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
 
 
 def contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
-    """The columns of a row that state it, see :class:`baselines.evaluation.metrics.Row`; none where nothing can meet.
+    """The columns of a row that state it, and its cost, see :class:`baselines.evaluation.metrics.Row`.
+
+    None where nothing can meet.
 
     Args:
         scenario: The scenario.
@@ -28,4 +30,5 @@ def contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
         "closest_pair": list(pair_names(scenario, episode.pair[step].astype(np.int64).tolist())),
         "closest_step": step + 1,
         "stopped": step + 1 if len(stops) else None,
+        "proximity_cost": None if episode.proximity_cost is None else float(add_up(episode.proximity_cost)),
     }

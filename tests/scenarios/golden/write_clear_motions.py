@@ -1,7 +1,8 @@
 """Writes clear_motions.json: `python -m tests.scenarios.golden.write_clear_motions [NAME …]` searches motions anew.
 
-A motion is a spline that begins at the start of the scenario. Gauss-Newton steps bring it onto the path and away from
-everything that is nearer than a distance; random ends give them several chances.
+A motion is a spline that begins at the start of the scenario. The first one is near the motion of `qp`. Gauss-Newton
+steps bring others onto the path and away from everything that is nearer than a distance; random ends give them several
+chances.
 """
 
 import json
@@ -10,6 +11,7 @@ import sys
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import baselines
 from ikgym import scenarios
 from ikgym.kernels.bodies import OBSTACLE, near_rows
 from ikgym.trajectories.batch import paths_of
@@ -40,6 +42,16 @@ class Search:
         unit = np.repeat(np.eye(CONTROL)[:, :, None], 1, axis=2)
         times = np.tile(self.times, (CONTROL, 1))
         self.basis = paths_of(unit, times, scenario.trajectory.duration)[:, :, 0].T @ self.spread
+
+    def followed(self):
+        """Control points near the motion of `qp`, at that margin, with slow prismatic joints."""
+        scenario, arm = self.scenario, self.scenario.arm
+        slow = arm.replace(velocity_limit=np.where(arm.prismatic, 0.1, 1.0) * arm.velocity_limit)
+        played = baselines.track(scenario.replace(arm=slow), f"qp:clearance={self.margin}").q
+        at = np.minimum(np.rint(self.times / scenario.dt).astype(int), len(played))
+        points = np.linalg.lstsq(self.basis, np.vstack([scenario.start, played])[at], rcond=None)[0]
+        points[0] = scenario.start
+        return points
 
     def first(self, end):
         """Control points along the path from the start; their end is moved elsewhere."""
@@ -122,9 +134,10 @@ def search(scenario, margin=0.03, tries=20):
     """The clearest of some motions, and its clearance in [m]."""
     problem, rng, arm, best = Search(scenario, margin), np.random.default_rng(0), scenario.arm, (-np.inf, None)
     for number in range(tries):
-        start = rng.uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)) if number else None
+        start = rng.uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)) if number > 1 else None
         ending = None if start is None else arm.inverse(problem.rotations[-1], problem.positions[-1], start=start)[0]
-        control = problem.spread @ problem.minimise(problem.first(ending))
+        points = problem.minimise(problem.first(ending)) if number else problem.followed()
+        control = problem.spread @ points
         q, converged = motion(scenario, control)
         clear = clearances(scenario, q)[0].min() if converged and max(shares(scenario, q)) < 1.0 else -np.inf
         best = max(best, (clear, control), key=lambda one: one[0])
