@@ -13,7 +13,7 @@ from baselines.solvers.rivals.base import WHOLE_POSES, Seen, Step
 from baselines.solvers.rivals.model_files import TIP, geom_name, urdf
 from baselines.solvers.rivals.solids import Solids, solids_of
 from baselines.solvers.rivals.task_program import TaskProgram
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -27,24 +27,26 @@ class Roboplan(TaskProgram):
 
     Args:
         tolerance: Of the program: largest residual, in [rad] or [m] a step, of a barrier in [m/s].
+        iterations: Of ProxQP, at most. Where it needs more, the arm is stopped for this step.
         barrier_gain: γ of the barrier in [1/s]: a pair with the distance h to `clearance` may lose γ h / (1 + |h|) in a
             second.
         safe_displacement_gain: Of the barrier: damping by the squared norm of its Jacobian.
     """
 
     tolerance: float = parameter(1e-6, number, above=0.0)
+    iterations: int = parameter(100, whole_number, at_least=1)
     barrier_gain: float = parameter(20.0, number, above=0.0)
     safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
 
     name: ClassVar[str] = "roboplan"
-    package: ClassVar[str] = "roboplan"
-    distribution: ClassVar[str] = "roboplan"
+    package: ClassVar[str] = "roboplan.optimal_ik"
+    distribution: ClassVar[str] = "roboplan-oink"
     #: Its frame task has one cost for all axes of the orientation.
     tasks: ClassVar[tuple[str, ...]] = (*WHOLE_POSES, "position")
 
     def make_step(self) -> Step:
         """See :meth:`Rival.make_step`."""
-        core, kinematics = self.imported("roboplan.core"), self.imported("roboplan.optimal_ik")
+        core, kinematics = self.imported("roboplan.core"), self.imported()
         solids, dt, n = solids_of(self.problem), self.problem.dt, self.model.joints
         scene = self._scene(core, solids)
         oink = kinematics.Oink(scene, self._settings(kinematics))
@@ -79,7 +81,7 @@ class Roboplan(TaskProgram):
 
     def _settings(self, kinematics: Any) -> Any:
         settings = kinematics.OinkSettings()
-        settings.eps_abs = self.tolerance
+        settings.eps_abs, settings.max_iter = self.tolerance, self.iterations
         settings.warm_start = False  # What a policy does depends on its observation alone.
         return settings
 
