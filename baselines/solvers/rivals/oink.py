@@ -49,7 +49,8 @@ class Roboplan(TaskProgram):
         core, kinematics = self.imported("roboplan.core"), self.imported()
         solids, dt, n = solids_of(self.problem), self.problem.dt, self.model.joints
         scene = self._scene(core, solids)
-        oink = kinematics.Oink(scene, self._settings(kinematics))
+        settings = self._settings(kinematics)
+        oink = kinematics.Oink(scene, settings)
         pose, moved = np.eye(4, order="F"), np.zeros(n)
         frame, *posture = tasks = self._tasks(core, kinematics, oink, scene)
         acceleration = kinematics.AccelerationLimit(oink, dt, np.array(self.problem.model.acceleration_limit))
@@ -64,7 +65,8 @@ class Roboplan(TaskProgram):
                 task.setTargetConfiguration(seen.start)
             acceleration.setLastVelocity(seen.qdot)
             try:
-                oink.solveIk(seen.q, tasks, limits, barriers, moved, self.damping)
+                # Made anew, since ProxQP goes on from its last step, and a policy depends on its observation alone.
+                kinematics.Oink(scene, settings).solveIk(seen.q, tasks, limits, barriers, moved, self.damping)
             except RuntimeError:
                 return None
             return moved / dt
@@ -82,7 +84,7 @@ class Roboplan(TaskProgram):
     def _settings(self, kinematics: Any) -> Any:
         settings = kinematics.OinkSettings()
         settings.eps_abs, settings.max_iter = self.tolerance, self.iterations
-        settings.warm_start = False  # What a policy does depends on its observation alone.
+        settings.warm_start = False
         return settings
 
     def _tasks(self, core: Any, kinematics: Any, oink: Any, scene: Any) -> list[Any]:
