@@ -62,6 +62,7 @@ _import_paths: dict[str, str] = {
     "fixed_point_extended": f"{_SOLVERS}.fixed_point.extended:FixedPointExtended",
     "pink": f"{_SOLVERS}.rivals.task_program:Pink",
     "mink": f"{_SOLVERS}.rivals.task_program:Mink",
+    "roboplan": f"{_SOLVERS}.rivals.oink:Roboplan",
     "follow_nominal": f"{_SOLVERS}.references.follow_nominal:FollowNominal",
     "oracle": "baselines.oracle.policy:Oracle",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -23,8 +23,13 @@ def joint_name(i: int) -> str:
     return f"joint{i + 1}"
 
 
-def urdf(arm: Arm) -> str:
-    """The chain of an arm from link ``base`` to link ``tool``, with its names and limits of position and velocity."""
+def urdf(arm: Arm, solids: Solids | None = None) -> str:
+    """The chain of an arm from link ``base`` to link ``tool``, with its names and limits of position and velocity.
+
+    Args:
+        arm: The arm.
+        solids: Its bodies and the obstacles, each as a link of its own.
+    """
     n = arm.joints
     links = [f'<link name="{name}"/>' for name in (BASE, *(f"link{i}" for i in range(1, n + 1)), TIP)]
     lower, upper = np.maximum(arm.lower, -NO_LIMIT), np.minimum(arm.upper, NO_LIMIT)
@@ -41,11 +46,30 @@ def urdf(arm: Arm) -> str:
         f'<joint name="tool_joint" type="fixed"><parent link="link{n}"/><child link="{TIP}"/>'
         f'<origin xyz="{_text(arm.tool)}" rpy="{_text(roll_pitch_yaw(arm.tool_rotation))}"/></joint>'
     )
-    return f"<robot name={quoteattr(arm.name)}>{''.join([*links, *joints, tool])}</robot>"
+    parts = [*links, *joints, tool, *_collisions(solids or Solids())]
+    return f"<robot name={quoteattr(arm.name)}>{''.join(parts)}</robot>"
+
+
+def _collisions(solids: Solids) -> Iterator[str]:
+    for i, (link, kind, rotation, position, half, radius) in enumerate(solids.each):
+        name, parent = geom_name(i), f"link{link}" if link > 0 else BASE
+        if kind == "plane":  # A box whose face is the plane: URDF has no half-spaces.
+            position, half = position - _WIDE * rotation[:, 2], np.full(3, _WIDE)
+        shape = {
+            "sphere": f'<sphere radius="{radius!r}"/>',
+            "capsule": f'<cylinder radius="{radius!r}" length="{2.0 * float(half[2])!r}"/>',
+        }.get(kind, f'<box size="{_text(2.0 * half)}"/>')
+        # This is how Pinocchio is told that a cylinder is a capsule.
+        capsule = f'<collision_checking><capsule name="{name}"/></collision_checking>' if kind == "capsule" else ""
+        yield (
+            f'<link name="{name}">{capsule}<collision name="{name}"><geometry>{shape}</geometry></collision></link>'
+            f'<joint name="{name}_joint" type="fixed"><parent link="{parent}"/><child link="{name}"/>'
+            f'<origin xyz="{_text(position)}" rpy="{_text(roll_pitch_yaw(rotation))}"/></joint>'
+        )
 
 
 def geom_name(i: int) -> str:
-    """Name of solid i in an MJCF."""
+    """Name of solid i, of its link in a URDF and of its geom in an MJCF."""
     return f"solid{i}"
 
 
@@ -94,6 +118,8 @@ def _geoms(solids: Solids, link: int) -> str:
 
 #: MuJoCo refuses bodies that move and have no mass; kinematics take no notice of it.
 _MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+#: Half of the edges in [m] of the box that stands for a half-space: more than any arm reaches.
+_WIDE = 10.0
 #: Farther than a joint goes, and less than what MuJoCo takes for too large a number.
 _FAR = 1e9
 

@@ -35,13 +35,11 @@ class TaskProgram(Rival, abc.ABC):
         posture_rate: Share of the way to the posture that is asked for in a second, in [1/s].
         damping: Of the whole program.
         limit_gain: Share of the distance to a position limit that a step may take. Above 0, at most 1.
-        solver: Of the program, a name of `qpsolvers`.
         clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
 
     Raises:
         InvalidInputError: See :class:`Rival`; a parameter is out of its range; or obstacles move or are drawn.
-        UnknownNameError: There is no such solver, or it is not installed.
-        MissingDependencyError: The package, or `qpsolvers`, is not installed.
+        MissingDependencyError: The package is not installed.
     """
 
     gain: float = parameter(1.0, number, above=0.0, at_most=1.0)
@@ -52,7 +50,6 @@ class TaskProgram(Rival, abc.ABC):
     posture_rate: float = parameter(1.0, number, at_least=0.0)
     damping: float = parameter(1e-12, number, at_least=0.0)
     limit_gain: float = parameter(0.5, number, above=0.0, at_most=1.0)
-    solver: str = "daqp"
     clearance: float = parameter(0.005, number, at_least=0.0)
 
     def __post_init__(self) -> None:
@@ -60,9 +57,6 @@ class TaskProgram(Rival, abc.ABC):
         check_at_rest(self.name, self.problem)
         if self.share > 1.0:
             raise InvalidInputError(f"posture_rate · Δt: expected at most 1, got {self.share:g}.")
-        known = self.imported("qpsolvers").available_solvers
-        if self.solver not in known:
-            raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
 
     @property
     def frame_costs(self) -> tuple[list[float], list[float]]:
@@ -77,7 +71,29 @@ class TaskProgram(Rival, abc.ABC):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Pink(TaskProgram):
+class SolverProgram(TaskProgram, abc.ABC):
+    """A program that `qpsolvers` solves.
+
+    Args:
+        solver: Of the program, a name of `qpsolvers`.
+
+    Raises:
+        InvalidInputError: See :class:`TaskProgram`.
+        UnknownNameError: There is no such solver, or it is not installed.
+        MissingDependencyError: The package, or `qpsolvers`, is not installed.
+    """
+
+    solver: str = "daqp"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known = self.imported("qpsolvers").available_solvers
+        if self.solver not in known:
+            raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pink(SolverProgram):
     """Pink (Caron et al., `pin-pink`): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
 
     The model is handed over as URDF. Limits are those of position, velocity and, where all joints have them,
@@ -141,7 +157,7 @@ class Pink(TaskProgram):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Mink(TaskProgram):
+class Mink(SolverProgram):
     """mink (Zakka, on MuJoCo): weighted tasks under limits; for the parameters see :class:`TaskProgram`.
 
     The model is handed over as MJCF. Limits are those of position and velocity; it has none of acceleration. Where

@@ -66,7 +66,27 @@ def test_coal_and_mujoco_measure_the_clearance_of_the_arm():
     assert clear > 10
 
 
-@pytest.mark.parametrize("name", ["pink", "mink"])
+def test_a_urdf_has_the_solids_of_the_arm():
+    scenario = shelf()
+    solids = solids_of(Problem.of(scenario))
+    text = urdf(scenario.arm, solids)
+    model = pin.buildModelFromXML(text)
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.COLLISION)
+    for i, j in solids.pairs:  # Pinocchio numbers the geometries of a link.
+        pair = (geometry.getGeometryId(f"{geom_name(one)}_0") for one in (i, j))
+        geometry.addCollisionPair(pin.CollisionPair(*pair))
+    data, measured = model.createData(), geometry.createData()
+    clear = 0
+    for q in postures(scenario.arm):
+        distance = scenario.arm.clearance(q, scenario.obstacles)[0]
+        if distance > 0.0:
+            clear += 1
+            pin.computeDistances(model, data, geometry, measured, q)
+            assert min(one.min_distance for one in measured.distanceResults) == pytest.approx(distance, abs=1e-9)
+    assert clear > 10
+
+
+@pytest.mark.parametrize("name", ["pink", "mink", "roboplan"])
 def test_a_wall_in_the_way_is_not_touched(name):
     """It stands across the way of the tool, half of which is behind it."""
     free = circle("panda-hand", acceleration_limit=np.full(7, np.inf))  # mink knows none
@@ -81,7 +101,7 @@ def test_a_wall_in_the_way_is_not_touched(name):
     assert rollout(scenario, baselines.make("dls", scenario), 0).stopped.any()
 
 
-@pytest.mark.parametrize("name", ["pink", "mink"])
+@pytest.mark.parametrize("name", ["pink", "mink", "roboplan"])
 def test_obstacles_that_move_are_refused(name):
     made(name, circle())
     with pytest.raises(InvalidInputError, match=f"{name}: expected obstacles at rest"):
