@@ -236,7 +236,8 @@ def bodies(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     for scenario, some in itertools.groupby(from_csv((RESULTS / "bodies.csv").read_text(encoding="utf-8")), _scenario):
         lines = list(some)
         played, episodes = [line["policy"] for line in lines], int(lines[0]["episodes"])
-        rows = evaluate(scenario, played, episodes=episodes, timed=TIMED, progress=True)
+        kept: dict[str, Any] = {"out": WORK / f"bodies-{scenario}", "resume": True, "report": False}
+        rows = evaluate(scenario, played, episodes=episodes, timed=TIMED, progress=True, **kept)
         errors = {name: max(row.position_error_max for row in rows if row.policy == name) for name in played}
         found = [{**record, "error_mm": 1e3 * errors[record["policy"]]} for record in records(rows, played)]
         out += [{column: record[column] for column in BODIES} for record in found]

@@ -30,6 +30,8 @@ RESULTS = Path(__file__).parent / "results"
 PATHS, TABLE = RESULTS / "obstructed_paths.csv", RESULTS / "obstructed.csv"
 #: Sets of problems by the beginnings of their names.
 SETS = {"RL-ITG, drawn": "rlitg-s", "RL-ITG, random": "rlitg-obstacle", "CppFlow": "cppflow"}
+#: Columns of the table: what passes.
+POLICIES = ("planned", "qp", "rhc_foresight", "published")
 #: Steps from waypoint to waypoint, most postures from which `qp` begins, and a finer search where there is no way.
 STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500})
 
@@ -49,7 +51,12 @@ def line(name: str) -> dict[str, Any]:
     for policy in ("planned", "rhc_foresight"):
         out[policy] = int(judged(scenario, found[0], policy).passed) if whole else 0
     passed, starts = among_starts(scenario)
-    return out | {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
+    out |= {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
+    theirs = [verdict(scenario, problems.trajectory(name, method)) for method in problems.published(name)]
+    return out | {
+        "published": sum(one.passed for one in theirs),
+        "published_clear": sum(one.clearance > 0.0 for one in theirs),
+    }
 
 
 def route(scenario: Scenario, search: Mapping[str, Any] = MappingProxyType({})) -> FloatArray:
@@ -94,7 +101,7 @@ def table(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         ways = {
             key: sum(int(one[key]) == int(one["poses"]) for one in here) for key in ("without_collisions", "reached")
         }
-        passed = {policy: sum(int(one[policy]) for one in here) for policy in ("planned", "qp", "rhc_foresight")}
+        passed = {policy: sum(int(one[policy]) for one in here) for policy in POLICIES}
         out.append({"set": label, "problems": len(here), **ways, **passed})
     return out
 
