@@ -18,6 +18,8 @@ from ikgym.validation import BoolArray, FloatArray, float_array, per_joint
 #: Joint motions aside from the task, as shares of the largest ones that are allowed, and how many random directions
 #: they have in null spaces of several dimensions.
 ASIDE, DIRECTIONS = np.linspace(-0.9, 0.9, 5), 3
+#: To first order a motion may be so many times the largest one: waypoints can be 10° apart.
+FIRST_ORDER = 1.3
 #: Share of the largest motion that is used, and distance in [m] and angle in [rad] within which a pose is met.
 USED, TOLERANCE = 0.999, 1e-9
 #: Between two knots bodies are checked at these parts of the way.
@@ -108,16 +110,14 @@ class Routes:
         """The postures at a knot that can be reached from those before."""
         arm = self.scenario.arm
         moves, rows = self._moves(knot, last.q, rng)
-        cost = last.cost[rows] + (moves * moves).sum(axis=1)
-        q = np.clip(last.q[rows] + self.largest * moves, arm.lower, arm.upper)
-        tried = Layer(q, cost, rows).of(self._cheapest(q, cost, rng))
-        q, met = arm.inverse(*self._pose(knot), start=tried.q, tolerance=TOLERANCE, restarts=0)
-        moved = (q - last.q[tried.before]) / self.largest
+        start = np.clip(last.q[rows] + self.largest * moves, arm.lower, arm.upper)
+        q, met = arm.inverse(*self._pose(knot), start=start, tolerance=TOLERANCE, restarts=0)
+        moved = (q - last.q[rows]) / self.largest
         near = met & (np.abs(moved).max(axis=1) <= USED)
-        cost = last.cost[tried.before] + (moved * moved).sum(axis=1)
-        found = Layer(q, cost, tried.before).of(near)
-        clear = np.all([self._clear(knot - 1.0 + part, self._between(last, found, part)) for part in PARTS], axis=0)
-        return found.of(clear)
+        found = Layer(q, last.cost[rows] + (moved * moved).sum(axis=1), rows).of(near)
+        for part in PARTS:
+            found = found.of(self._clear(knot - 1.0 + part, self._between(last, found, part)))
+        return found.of(self._cheapest(found.q, found.cost, rng))
 
     def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""
@@ -143,7 +143,7 @@ class Routes:
                 moves.append(least + _aside(least, direction, share)[:, None] * direction)
                 begins.append(rows)
         every = np.concatenate(moves)
-        small = np.abs(every).max(axis=1) <= 1.0
+        small = np.abs(every).max(axis=1) <= FIRST_ORDER
         return every[small], np.concatenate(begins)[small]
 
     def _pose(self, knot: int) -> tuple[FloatArray | None, FloatArray]:
