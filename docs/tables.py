@@ -57,8 +57,8 @@ def scenarios() -> list[tuple[str, ...]]:
         s = ikgym.scenarios.get(name)
         if name not in ikgym.scenarios.names("paths") or s.random:
             arm = f"`{s.arm.name}`" if s.model is s.arm else f"`{s.arm.name}`, model `{s.model.name}`"
-            source = s.source.replace("random motion of this project", "")
-            rows.append((f"`{name}`", arm, f"`{s.task.name}`", f"{s.dt:g}", f"{s.steps:,}", source.strip(", ")))
+            source = re.sub(r"(random motion|plant|path) of this project", "", s.source).strip(", ")
+            rows.append((f"`{name}`", arm, f"`{s.task.name}`", f"{s.dt:g}", f"{s.steps:,}", source))
     return rows
 
 
@@ -116,7 +116,7 @@ def test_sets() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("set", "episodes", "noise seeds", "steps", "task coordinates")]
     for one in map(sets.get, sets.names()):
         scenario = one.scenario
-        which = f"the first {one.episodes} of the {one.split} split"
+        which = f"{one.episodes}"
         which += f", {one.sequence} in a row by one arm" if one.sequence > 1 else ""
         rows.append((f"`{one.name}`", which, str(one.noise_seeds), f"{scenario.steps:,}", f"`{scenario.task.name}`"))
     return rows
