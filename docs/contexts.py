@@ -22,7 +22,7 @@ from baselines.evaluation.metrics import lost
 from baselines.evaluation.records import from_csv
 from baselines.files import write_json
 from baselines.statistics import geometric_interval, geometric_mean
-from baselines.training.config import PPO
+from baselines.training.config import PPO, RecurrentPPO
 from ikgym.rl import Task, scoring
 from ikgym.validation import BoolArray, FloatArray
 
@@ -53,12 +53,12 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
     "qp": ("qp", {"gain": 0.3}),
     "dls": ("dls", {"gain": 0.15}),
 }
-#: Learners by their names: the algorithm, the network, and what is observed.
+#: Learners by their names: published settings, and what is observed.
 USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
 LEARNERS = {
-    "ppo_shown": ("ppo", "MlpPolicy", USUAL.replace(context=True)),
-    "ppo_history": ("ppo", "MlpPolicy", USUAL.replace(history=4)),
-    "ppo_recurrent": ("recurrent_ppo", "MlpLstmPolicy", USUAL),
+    "ppo_shown": (PPO(env="ikgym/Track-v0"), USUAL.replace(context=True)),
+    "ppo_history": (PPO(env="ikgym/Track-v0"), USUAL.replace(history=4)),
+    "ppo_recurrent": (RecurrentPPO(env="ikgym/Camera-v0"), USUAL),
 }
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
@@ -120,8 +120,8 @@ def _learner(name: str, files: Sequence[Path]) -> Played:
     """The models of a learner on the first episodes of each split."""
     from baselines.training.rewards import ALGORITHMS
 
-    algorithm, _, task = LEARNERS[name]
-    models, out = [ALGORITHMS[algorithm].load(file, device="cpu") for file in files], {}
+    learner, task = LEARNERS[name]
+    models, out = [ALGORITHMS[learner.method].load(file, device="cpu") for file in files], {}
     for split, (scenario, seeds) in SPLITS.items():
         found = [play(model, task, scenario, ikgym.scenarios.seeds(seeds, EPISODES)) for model in models]
         out[split] = np.array([costs for costs, _ in found]), np.array([away for _, away in found])
@@ -153,9 +153,9 @@ def train(name: str, seed: int, steps: int) -> None:
         return
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
-    algorithm, network, task = LEARNERS[name]
-    settings = {**rewards.read(PPO(env="ikgym/Track-v0")), "policy": network}
-    model = rewards.built(rewards.ALGORITHMS[algorithm], LearningVecEnv(settings["n_envs"], task), settings, seed)
+    learner, task = LEARNERS[name]
+    settings = rewards.read(learner)
+    model = rewards.built(rewards.ALGORITHMS[learner.method], LearningVecEnv(settings["n_envs"], task), settings, seed)
     begin = time.process_time()
     model.learn(steps)
     minutes = round((time.process_time() - begin) / 60.0, 1)

@@ -25,7 +25,7 @@ class Policy:
 
 
 def test_a_learner_is_scored_as_a_policy_is():
-    costs, lost = contexts.play(Policy(), contexts.LEARNERS["ppo_shown"][2], "learning-context", SEEDS)
+    costs, lost = contexts.play(Policy(), contexts.LEARNERS["ppo_shown"][1], "learning-context", SEEDS)
 
     class Still:
         preview = 1
@@ -69,5 +69,5 @@ def test_recurrent_learners_remember(tmp_path, monkeypatch):
     monkeypatch.setattr(contexts, "RUNS", tmp_path)
     contexts.train("ppo_recurrent", 0, 2048)
     model = RecurrentPPO.load(tmp_path / "context-ppo_recurrent" / "seed-0" / "model.zip")
-    costs, _ = contexts.play(model, contexts.LEARNERS["ppo_recurrent"][2], "learning-context", SEEDS)
+    costs, _ = contexts.play(model, contexts.LEARNERS["ppo_recurrent"][1], "learning-context", SEEDS)
     assert np.isfinite(costs).all()
