@@ -15,6 +15,7 @@ from baselines.training import run, seeds
 from baselines.training.config import APG
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import RunOptions, Seed
+from tests.baselines.losing import LosingCluster
 from tests.baselines.training.small import about, timeless, tiny
 from tests.spawning import dies_with_seed_7
 
@@ -27,30 +28,32 @@ TINY = [
 
 
 @pytest.fixture(scope="module")
-def several(tmp_path_factory):
-    """Seeds 1 and 5 in two processes."""
-    folder = tmp_path_factory.mktemp("several")
-    assert main(["apg", *TINY, "--seeds", "1", "5", "--workers", "2", "--out", str(folder)]) == 0
+def alone(tmp_path_factory):
+    """Seed 1, in this process."""
+    folder = tmp_path_factory.mktemp("alone")
+    assert main(["apg", *TINY, "--seeds", "1", "--out", str(folder)]) == 0
     return folder
 
 
-def test_several_seeds(several, tmp_path, capsys):
-    """Each has its folder, and ends as if it were alone."""
-    assert sorted(path.name for path in several.iterdir()) == ["seed-1", "seed-5"]
-    assert len({about(several / f"seed-{seed}")["weights_sha256"] for seed in (1, 5)}) == 2
-    assert main(["apg", *TINY, "--seeds", "5", "--out", str(tmp_path)]) == 0
-    assert about(tmp_path / "seed-5")["weights_sha256"] == about(several / "seed-5")["weights_sha256"]
-    assert timeless(tmp_path / "seed-5") == timeless(several / "seed-5")
+def test_several_seeds(alone, tmp_path, capsys, monkeypatch):
+    """On nodes of a cluster: each has its folder, and ends as if it were alone, also after the loss of a node."""
+    LosingCluster(monkeypatch, lost=[0])
+    assert main(["apg", *TINY, "--seeds", "1", "5", "--cluster", "ray", "--out", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["seed-1", "seed-5"]
+    assert about(tmp_path / "seed-1")["weights_sha256"] == about(alone / "seed-1")["weights_sha256"]
+    assert about(tmp_path / "seed-5")["weights_sha256"] != about(alone / "seed-1")["weights_sha256"]
+    assert timeless(tmp_path / "seed-1") == timeless(alone / "seed-1")
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].split() == ["seed", "cost", "ratio", "cost", "worst", "lost"]
-    assert printed[1].split()[:2] == ["5", "–"]
+    assert [line.split()[:2] for line in printed[1:3]] == [["1", "–"], ["5", "–"]]
 
 
 @pytest.mark.slow
-def test_a_seed_that_fails_does_not_end_the_others(several, tmp_path, monkeypatch, capfd):
+def test_a_seed_that_fails_does_not_end_the_others(alone, tmp_path, monkeypatch, capfd):
+    """Processes of this machine."""
     monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
     assert main(["apg", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
-    assert about(tmp_path / "seed-1")["weights_sha256"] == about(several / "seed-1")["weights_sha256"]
+    assert about(tmp_path / "seed-1")["weights_sha256"] == about(alone / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
     assert "   7  failed" in printed.out
     assert "error: seed 7: " in printed.err
@@ -63,8 +66,8 @@ def test_an_error_of_a_seed_is_said(tmp_path, monkeypatch, capfd):
     assert "Traceback" in capfd.readouterr().err
 
 
-def test_repeat(several, tmp_path, capsys):
-    folder, arguments = several / "seed-1", ["--no-progress", "--out"]
+def test_repeat(alone, tmp_path, capsys):
+    folder, arguments = alone / "seed-1", ["--no-progress", "--out"]
     assert main(["repeat", str(folder / "run.json"), *arguments, str(tmp_path / "again")]) == 0
     assert "The same final weights, bit for bit" in capsys.readouterr().out
     assert timeless(tmp_path / "again" / "seed-1") == timeless(folder)

@@ -71,7 +71,7 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
     file = tmp_path / "long.yml"
     entry = "{n_timesteps: 10000000, n_steps: 16, batch_size: 16, learning_rate: lin_0.001}"
     file.write_text(f"{TRACK}: {entry}\n", encoding="utf-8")
-    about = Training(options("ppo", minutes=0.02, settings=file), 0, tmp_path / "run").run()
+    about = Training(options("ppo", minutes=0.002, settings=file), 0, tmp_path / "run").run()
     assert 0 < about["steps"] < 10_000_000
     rate = PPO.load(tmp_path / "run" / "model.zip").policy.optimizer.param_groups[0]["lr"]
     assert 0.0009 < rate <= 0.001
