@@ -40,18 +40,15 @@ def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
     return step
 
 
-def single() -> tuple[Calls, tuple[str, ...]]:
-    """Steps through `gym.make` by name, and what is left out."""
+def single() -> Calls:
+    """Steps through `gym.make` by name."""
     calls: Calls = {
         OURS: stepper("RedundantIK-v0", scenario="varga7-fast"),
         "RedundantIK-v0, varga7-random": stepper("RedundantIK-v0", scenario="varga7-random"),
         "Pendulum-v1": stepper("Pendulum-v1"),
+        "Reacher-v5": stepper("Reacher-v5"),
     }
-    try:
-        calls["Reacher-v5"] = stepper("Reacher-v5")
-    except (ImportError, gym.error.DependencyNotInstalled) as e:
-        return calls, (f"Reacher-v5: {e}",)
-    return calls, ()
+    return calls
 
 
 def vector(rows: int) -> tuple[Calls, tuple[str, ...]]:
@@ -100,14 +97,12 @@ def _stepping(envs: Any, rows: int | None = None) -> Callable[[], object]:
 
 
 def _single_table(effort: Effort) -> Table:
-    calls, skipped = single()
-    times = medians(calls, effort.rounds, effort.seconds)
+    times = medians(single(), effort.rounds, effort.seconds)
     return Table(
         "One step of one environment",
         "Through `gym.make` with its usual wrappers, a fixed action, the resets of ended episodes included; medians.",
         ("step [µs]", "× varga7-fast"),
         {name: (1e6 * t, t / times[OURS]) for name, t in times.items()},
-        skipped,
     )
 
 

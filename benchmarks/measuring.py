@@ -65,6 +65,14 @@ def medians(calls: Mapping[Name, Call], rounds: int = 15, seconds: float = 0.05)
     return {name: statistics.median(values) for name, values in times.items()}
 
 
+def per_item(calls: Mapping[str, tuple[Call, int]], effort: Effort) -> dict[str, tuple[float | None, ...]]:
+    """Rows of a table of calls with their numbers of items: the time of an item in [µs], and that over the first's."""
+    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
+    each = {name: t / calls[name][1] for name, t in times.items()}
+    first = next(iter(each.values()))
+    return {name: (1e6 * t, t / first) for name, t in each.items()}
+
+
 def _time(call: Call, repeats: int) -> float:
     begin = time.perf_counter()
     for _ in range(repeats):

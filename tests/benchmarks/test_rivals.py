@@ -7,16 +7,11 @@ from scipy.optimize import lsq_linear
 import ikgym
 from baselines.policy import Problem
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon, forward, plan_cost
+from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost
-
-
-@pytest.fixture(params=ikgym.arms.names())
-def arm(request) -> Arm:
-    return ikgym.arms.get(request.param)
 
 
 def problem_of(arm: Arm, task: str = "skew", **cost: float) -> Problem:
@@ -33,23 +28,17 @@ def random_horizon(problem: Problem, knots: int, seed: int = 0, far: float = 1.0
     return Horizon(q + far * rng.normal(0.0, 1e-3, n), nominal), path + rng.normal(0.0, 2e-4, path.shape)
 
 
-def test_numpy_kinematics_are_those_of_the_kernels(arm):
-    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (5, arm.joints)):
-        for mine, kernels in zip(forward(arm, q), arm.forward(q), strict=True):
-            np.testing.assert_allclose(mine, kernels, atol=1e-13)
-
-
-def test_numpy_cost_is_that_of_the_kernels(arm):
-    for task in ikgym.tasks.names():
-        problem = problem_of(arm, task, p_x=3.5, p_in=2.0)
-        horizon, plan = random_horizon(problem, 4)
-        qdot = np.diff(np.vstack([horizon.q, plan]), axis=0) / problem.dt
-        kernels = horizon_cost(data_of(problem), horizon.q, horizon.nominal, qdot)
-        assert plan_cost(problem, horizon, plan) == pytest.approx(kernels, rel=1e-9), task
-
-
 #: All tasks with one arm, and one task with each arm: a product of both says nothing more.
 PAIRS = [*(("varga7", task) for task in ikgym.tasks.names()), *((name, "pose") for name in ikgym.arms.names())]
+
+
+@pytest.mark.parametrize(("arm", "task"), PAIRS)
+def test_numpy_cost_is_that_of_the_kernels(arm, task):
+    problem = problem_of(ikgym.arms.get(arm), task, p_x=3.5, p_in=2.0)
+    horizon, plan = random_horizon(problem, 4)
+    qdot = np.diff(np.vstack([horizon.q, plan]), axis=0) / problem.dt
+    kernels = horizon_cost(data_of(problem), horizon.q, horizon.nominal, qdot)
+    assert plan_cost(problem, horizon, plan) == pytest.approx(kernels, rel=1e-9)
 
 
 @pytest.mark.parametrize(("arm", "task"), PAIRS)
@@ -105,22 +94,6 @@ def test_other_exponents(p_x):
 def test_exponents_without_a_smooth_form_are_refused(cost):
     with pytest.raises(InvalidInputError, match="expected"):
         CasadiHorizon(problem_of(ikgym.arms.get("varga7"), **cost), 2)
-
-
-@pytest.mark.parametrize("path", ["varga7-fast", "varga7-slow"])
-def test_crocoddyl_finds_the_same_optimum(path):
-    pytest.importorskip("crocoddyl", reason="pip install ikgym[rivals]")
-    from benchmarks.rivals.crocoddyl_horizon import CrocoddylHorizon
-
-    scenario = ikgym.scenarios.get(path)
-    problem = Problem.of(scenario)
-    joints, nominal = scenario.nominal_joint_path(0), scenario.nominal(0, preview=10)
-    ipopt, fddp = CasadiHorizon(problem, 9), CrocoddylHorizon(problem, 9)
-    for k in (0, 800, 2200):
-        horizon = Horizon(joints[k] + 1e-4, nominal[k + 1 : k + 10])
-        assert fddp.solve(horizon).cost == pytest.approx(ipopt.solve(horizon).cost, rel=1e-6)
-        uneven = Horizon(horizon.q, horizon.nominal, np.linspace(1.0, 3.0, 9), np.linspace(2.0, 1.0, 9))
-        assert fddp.solve(uneven).cost == pytest.approx(ipopt.solve(uneven).cost, rel=1e-6)
 
 
 def multiplier_gap(problem: Problem, horizon: Horizon, q: np.ndarray) -> float:

@@ -17,7 +17,6 @@ from baselines.papers.runs import Runs
         (True, "reproduced"),
         (False, "contradicted"),
         (None, "not testable"),
-        ({1: True, 2: True}, "reproduced"),
         ({1: False, 2: False, 3: False}, "contradicted"),
         ({1: True, 2: False}, "depends"),
         ({}, "contradicted"),
@@ -38,7 +37,6 @@ def test_figures_in_words():
         (1.0, 0.8, {"a": True}),
         (0.8, 1.0, {"a": False}),
         (1.0, 0.95, {}),
-        (0.0, 0.0, {}),
         (0.0, 3.0, {"a": False}),
     ],
 )

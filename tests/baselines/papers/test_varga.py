@@ -117,11 +117,7 @@ def test_a_close_up_shows_the_fluctuations_and_not_the_start():
     assert part.stop >= 309
 
 
-def test_the_fast_path_is_beyond_90_degrees_most_of_the_time():
-    finding = claims.skew_part_determines(Runs())
-    assert finding.verdict == "contradicted"
-    assert finding.figures["fast [%]"] == pytest.approx(81.4, abs=0.1)
-    assert finding.figures["slow [%]"] == 0.0
+def test_angles_are_those_of_the_reference_rotations():
     scenario = ikgym.scenarios.get("varga7-slow")
     rotations, _ = scenario.arm.forward(scenario.nominal_joint_path())
     wanted = [np.linalg.norm(ikgym.kernels.rotations.rotation_vector(r)) for r in rotations]
