@@ -6,7 +6,7 @@ import dataclasses
 import pathlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
@@ -29,12 +29,10 @@ class Finding(NamedTuple):
         holds: Whether the claim holds; by reading or condition if the text allows several; None if nothing in the text
             decides.
         figures: The figures that decide.
-        more: Further figures, for the file of numbers alone.
     """
 
     holds: bool | Mapping[str, bool] | None
     figures: Figures
-    more: Figures = MappingProxyType({})
 
     @property
     def verdict(self) -> Verdict:

@@ -96,7 +96,7 @@ def _draw(paper: Paper, runs: Runs, numbers: set[int] | None, folder: pathlib.Pa
 
 def _write_numbers(file: pathlib.Path, findings: Mapping[str, Finding]) -> None:
     claims = {
-        name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures, "more": found.more}
+        name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures}
         for name, found in findings.items()
     }
     content = jsonable({"machine": describe(), "claims": claims})
