@@ -12,10 +12,9 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import baselines
 from baselines.episodes import rollouts
 from baselines.files import ResultsError
-from baselines.training import folder as folder_module
 from baselines.training import run as run_module
 from baselines.training.config import TrainingError
-from baselines.training.folder import FORMAT, MAGIC
+from baselines.training.folder import FORMAT
 from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train, weights_hash
 from baselines.training.validation import validation_seeds
@@ -197,11 +196,11 @@ def test_another_run_is_not_resumed(finished, monkeypatch):
         train(CONFIG, 3, finished[0], resume=True)
 
 
-def sealed(content):
-    """A checkpoint with the right digest and any content."""
+def saved(content):
+    """A checkpoint with any content."""
     stream = io.BytesIO()
     torch.save(content, stream)
-    return folder_module.sealed(stream.getvalue())
+    return stream.getvalue()
 
 
 class Evil:
@@ -214,9 +213,9 @@ class Evil:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
-        ("checkpoint.pt", sealed({"format": 99}), "it has another format"),
-        ("checkpoint.pt", sealed({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
+        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged"),
+        ("checkpoint.pt", saved({"format": 99}), "it has another format"),
+        ("checkpoint.pt", saved({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
         ("run.json", b"{", "run.json is damaged"),
         ("run.json", b'{"format": 2}', f"differs in format \\(2 there, {FORMAT} here\\)"),
     ],
@@ -225,16 +224,6 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ResultsError, match=message):
-        train(CONFIG, 3, tmp_path, resume=True)
-
-
-def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
-    """PyTorch would read it without an error."""
-    damaged = bytearray((finished[0] / "checkpoint.pt").read_bytes())
-    damaged[np.random.default_rng().integers(len(MAGIC) + 65, len(damaged))] ^= 64
-    copied(finished[0], tmp_path)
-    (tmp_path / "checkpoint.pt").write_bytes(damaged)
-    with pytest.raises(ResultsError, match="it is damaged: expected the SHA-256"):
         train(CONFIG, 3, tmp_path, resume=True)
 
 
