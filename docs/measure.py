@@ -244,8 +244,9 @@ def _batch_time(scenario: ikgym.Scenario, policy: Any, seeds: Sequence[int]) -> 
     return 1e6 * spent / (BATCHED * len(seeds))
 
 
-#: Tables that are measured as a whole.
+#: Tables that are measured as a whole, and others with columns of their own.
 WHOLE = {"bodies": bodies, "periods": periods}
+OWN = {"agents_interval": intervals, "contexts": contexts.measured, "plants": plants}
 
 
 def main(command: Command) -> None:
@@ -254,11 +255,8 @@ def main(command: Command) -> None:
     for name in command.tables:
         if name in WHOLE and (command.new or command.times):
             raise SystemExit(f"{name}: costs are relative to the lowest in the table, which is measured as a whole.")
-        own = {"agents_interval": intervals, "contexts": contexts.measured, "plants": plants}
-        make = WHOLE.get(name) or functools.partial(
-            own.get(name, functools.partial(measured, name)), only_new=command.new, only_times=command.times
-        )
-        new = make()
+        make = OWN.get(name, functools.partial(measured, name))
+        new = WHOLE[name]() if name in WHOLE else make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
             shutil.rmtree(folder)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 ROOT = Path(__file__).parents[1] / "examples"
 #: Arguments that make each example short.
@@ -38,21 +37,6 @@ def test_example(example, capsys, tmp_path):
         assert last < 0.8 * first
     made = [path.relative_to(tmp_path / "sac").as_posix() for path in sorted(tmp_path.glob("sac/**/*.*"))]
     assert made == (["track-sac.zip", "videos/track-episode-0.mp4"] if example == "sac" else [])
-
-
-def test_an_advantage_is_what_a_step_gains_over_the_value():
-    """A lost track has nothing after it; the last step of an episode has a value, and no advantages of the next one."""
-    example = runpy.run_path(str(ROOT / "ppo.py"))
-    rows, steps, gamma = example["ENVS"], example["STEPS"], example["GAMMA"]
-    lost, ended = torch.zeros(steps, rows), torch.zeros(steps, rows)
-    ended[5] = ended[-1] = lost[5, 1] = 1.0
-    batch = {"reward": torch.ones(steps, rows), "lost": lost, "ended": ended}
-    value, after = torch.full((steps, rows), 3.0), torch.full((steps, rows), 4.0)
-    found = example["advantages"](batch, value, after)
-    last = 1.0 + gamma * 4.0 - 3.0
-    assert found[5, 0] == found[-1, 1] == pytest.approx(last)
-    assert found[5, 1] == pytest.approx(1.0 - 3.0)
-    assert found[4, 0] == pytest.approx(last + gamma * example["LAMBDA"] * last)
 
 
 @pytest.mark.slow

@@ -108,17 +108,6 @@ def test_another_arm_has_another_record(file):
     assert (cost(noisy, 0, 3), cost(noisy, 0)) == (20.0, 10.0)
 
 
-def test_the_file_is_sorted_and_a_new_record_changes_one_line(file):
-    slow = ikgym.scenarios.get("varga7-slow")
-    record([one(slow, 3.0), one(short(), 2.0, seed=10), one(short(), 1.0, seed=9)], file)
-    before = file.read_text(encoding="utf-8").splitlines()
-    assert [(r.scenario, r.seed) for r in read(file)] == [(NAME, 9), (NAME, 10), ("varga7-slow", 0)]
-    record([one(short(), 1.5, seed=10, spread={"worst": 1.0, "starts": 2})], file)
-    after = file.read_text(encoding="utf-8").splitlines()
-    assert [a == b for a, b in zip(before, after, strict=True)] == [True, True, False, True, True]
-    assert not list(file.parent.glob("*.tmp"))
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0])
 def test_bad_costs_are_refused_and_nothing_is_written(file, value):
     with pytest.raises(ResultsError, match="expected a cost of at least 0"):
@@ -174,7 +163,7 @@ DOUBTFUL = [r.scenario for r in read() if r.seed == 0 and r.cost > 1e-9 and r.sp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*DOUBTFUL, "varga7-fast", "panda-line", "iiwa14-fast"])
+@pytest.mark.parametrize("name", DOUBTFUL)
 def test_no_planner_beats_a_record(name):
     better = [(row.policy, row.total_cost) for row in evaluate(name, PLANNERS) if beaten(row)]
     assert not better, f"write them down with: {best_known.UPDATE}"

@@ -153,16 +153,6 @@ def costly():
     return problem, paths, improved.costs
 
 
-def test_a_path_gets_never_worse(costly):
-    problem, before, _ = costly
-    paths, last = before.copy(), np.full(2, np.inf)
-    for _ in range(20):
-        improved = local_search.Improved(*np.empty((3, 2)))
-        local_search.improve(problem, NewtonSettings(True, 1, 1e-12), paths, improved, 0, 2)
-        assert (improved.costs <= last).all()
-        last = improved.costs
-
-
 def test_the_local_search_finds_what_a_start_does_not(costly):
     problem, before, costs_before = costly
     paths, costs = before.copy(), costs_before.copy()

@@ -141,14 +141,6 @@ def test_the_command_writes_model_agent_curve_and_score_and_goes_on_where_it_was
     assert "run.json differs in settings" in capsys.readouterr().err
 
 
-def test_environments_with_a_history_have_no_agent_and_say_why(tmp_path):
-    file, env = tmp_path / "small.yml", "ikgym/Payload-v0"
-    file.write_text(f"{env}: {SMALL['ppo']}\n", encoding="utf-8")
-    about = Training(options("ppo", env=env, settings=file), 0, tmp_path / "run").run()
-    assert about["agent"].startswith("none: model: expected a network from 38 features to 7 outputs, got 272")
-    assert not (tmp_path / "run" / "agent.safetensors").exists()
-
-
 @pytest.mark.parametrize("settings", ["recurrent_ppo"], indirect=True)
 def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
     about = Training(options("recurrent_ppo", settings=settings), 0, tmp_path / "run").run()
