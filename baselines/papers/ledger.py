@@ -1,16 +1,11 @@
-"""The ledger: claims of the papers and findings of their tests, as a CSV file and as Markdown."""
+"""The ledger: claims of the papers and findings of their tests, in rows and as Markdown."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from baselines.papers.paper import Finding, Paper
-
-#: Fields of the CSV file.
-FIELDS = ("paper", "claim", "verdict", "figures")
 
 Row = Mapping[str, str]
 
@@ -22,24 +17,10 @@ def rows(findings: Mapping[str, Mapping[str, Finding]]) -> list[Row]:
         findings: The results, by paper and claim.
     """
     return [
-        dict(zip(FIELDS, (paper, claim, found.verdict, found.text), strict=True))
+        {"paper": paper, "claim": claim, "verdict": found.verdict, "figures": found.text}
         for paper, of_paper in findings.items()
         for claim, found in of_paper.items()
     ]
-
-
-def to_csv(results: Iterable[Row]) -> str:
-    """The rows as the text of a CSV file."""
-    out = io.StringIO()
-    writer = csv.DictWriter(out, FIELDS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(results)
-    return out.getvalue()
-
-
-def from_csv(text: str) -> list[Row]:
-    """The rows of a CSV file that :func:`to_csv` has written."""
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def markdown(papers: Sequence[Paper], results: Iterable[Row]) -> str:

@@ -21,6 +21,7 @@ from baselines.cli import shell
 from baselines.cli.parsing import parse
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
+from baselines.evaluation.records import to_csv
 from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
@@ -78,7 +79,7 @@ def reproduce(
                 _write_numbers(folder / paper.name / "numbers.json", findings[paper.name])
         if folder is not None and numbers is None:
             results = ledger.rows(findings)
-            write(folder / "claims.csv", ledger.to_csv(results).encode())
+            write(folder / "claims.csv", to_csv(results).encode())
             write(folder / "papers.md", ledger.markdown(chosen, results).encode())
     return findings
 

@@ -8,6 +8,7 @@ import re
 import pytest
 
 from baselines.cli.commands.reproduce import main
+from baselines.evaluation.records import from_csv
 from baselines.papers import PAPERS, ledger
 from baselines.papers.paper import Finding
 from baselines.papers.runs import Runs
@@ -37,7 +38,7 @@ def test_the_command_draws_and_tests_everything(name, tmp_path, monkeypatch, cap
     paper = dataclasses.replace(PAPERS[name], figures=PAPERS[name].figures[:1])
     monkeypatch.setitem(PAPERS, name, paper)
     assert main(["--paper", name, "--steps", str(STEPS), "--out", str(tmp_path)]) == 0
-    results = ledger.from_csv((tmp_path / "claims.csv").read_text())
+    results = from_csv((tmp_path / "claims.csv").read_text())
     assert [row["claim"] for row in results] == [claim.name for claim in paper.claims]
     assert all(row["verdict"] in VERDICTS for row in results)
     (figure,) = paper.figures
@@ -63,7 +64,7 @@ def test_the_command_draws_figures_alone(capsys, tmp_path):
 def in_the_tree():
     """Verdicts and figures in docs/results/papers.csv, by paper and claim."""
     results = {}
-    for row in ledger.from_csv((DOCS / "results" / "papers.csv").read_text(encoding="utf-8")):
+    for row in from_csv((DOCS / "results" / "papers.csv").read_text(encoding="utf-8")):
         results.setdefault(row["paper"], {})[row["claim"]] = row["verdict"], row["figures"]
     return results
 

@@ -100,7 +100,7 @@ def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
         (["apg", "--window", "1000000000"], "window: expected a whole number from 1 to 10000, got 1000000000."),
         (["apg", "--window", "7"], "window: expected multiples of hold"),
         (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
-        (["apg", *TINY, "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
+        (["apg", *TINY[2:], "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
         (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
     ],
 )

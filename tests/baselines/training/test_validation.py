@@ -29,7 +29,7 @@ def test_scores_are_those_of_an_evaluation():
 
 def test_lost_arms_are_counted():
     scenario = SCENARIO.replace(steps=300)
-    assert score(baselines.make("dls", scenario, gain=1e-6), scenario, 4).lost == 1.0
+    assert score(baselines.make("dls", scenario, damping=1e3), scenario, 4).lost == 1.0
 
 
 def test_cost_ratio_is_over_the_reference(monkeypatch):
