@@ -83,13 +83,7 @@ def _table(name: str, grid: int, effort: Effort, conditions: str) -> Table:
 
 
 def solvers(scenario: Scenario, grid: int, observations: Sequence[Observation]) -> dict[str, Solve]:
-    """The solvers of a horizon by label, at the last of some states; each has solved those before.
-
-    Args:
-        scenario: The scenario.
-        grid: HL.
-        observations: The states.
-    """
+    """The solvers of a horizon of HL grid points by label, at the last of some states; each has solved those before."""
     out = {
         label: _policy(baselines.make(name, scenario, horizon=grid, **parameters), observations)
         for label, (name, parameters, most) in POLICIES.items()
@@ -132,14 +126,7 @@ def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> Float
 
 
 def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[Observation]]:
-    """States of an episode of `rhc` with the same horizon, evenly spread, each after ``lead`` others that lead to it.
-
-    Args:
-        scenario: The scenario.
-        preview: Steps of the nominal trajectory that the observations show.
-        count: The number of states.
-        lead: Steps shown before each of them.
-    """
+    """States of an episode of `rhc` with that horizon, evenly spread, each after ``lead`` others that lead to it."""
     policy = baselines.make("rhc", scenario, horizon=preview + 1)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=preview)
     observation, _ = env.reset(seed=0)

@@ -41,14 +41,7 @@ UPRIGHT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def circle(arm: ikgym.Arm, start: npt.ArrayLike, period: float, seconds: float = SECONDS) -> ikgym.Scenario:
-    """A scenario whose tool goes upright on the circle, from where the arm stands.
-
-    Args:
-        arm: The arm.
-        start: Its joint coordinates in [rad] or [m]. Shape (n,).
-        period: Δt in [s].
-        seconds: How long it is played.
-    """
+    """A scenario whose tool goes upright on the circle, from joint coordinates (n,) in [rad] or [m]; Δt in [s]."""
     rotation, position = arm.forward(start)
     path = Circle(position - 0.1 * UPRIGHT[:, 0], 0.1, rotation=UPRIGHT)
     trajectory = PathTrajectory(path, Trapezoidal(0.1, 0.5), FixedOrientation(rotation))

@@ -192,12 +192,7 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def measured(file: str, *words: str) -> str:
-    """The table of a CSV file.
-
-    Args:
-        file: The file, relative to this folder.
-        words: `columns=NAME,NAME,…` chooses columns, `NAME=VALUE` lines with that value in that column.
-    """
+    """The table of a CSV file: `columns=NAME,NAME,…` chooses columns, `NAME=VALUE` lines with that value there."""
     wanted = dict(word.split("=", 1) for word in words)
     columns = wanted.pop("columns", "").split(",")
     lines = from_csv((PAGES / file).read_text(encoding="utf-8"))

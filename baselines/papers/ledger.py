@@ -11,11 +11,7 @@ Row = Mapping[str, str]
 
 
 def rows(findings: Mapping[str, Mapping[str, Finding]]) -> list[Row]:
-    """One row a claim.
-
-    Args:
-        findings: The results, by paper and claim.
-    """
+    """One row a claim, of findings by paper and claim."""
     return [
         {"paper": paper, "claim": claim, "verdict": found.verdict, "figures": found.text}
         for paper, of_paper in findings.items()
@@ -24,12 +20,7 @@ def rows(findings: Mapping[str, Mapping[str, Finding]]) -> list[Row]:
 
 
 def markdown(papers: Sequence[Paper], results: Iterable[Row]) -> str:
-    """The ledger as Markdown: a table for each paper.
-
-    Args:
-        papers: The papers, in order.
-        results: The rows of all their claims.
-    """
+    """The ledger as Markdown: a table for each paper, of the rows of all their claims."""
     by_claim = {(row["paper"], row["claim"]): row for row in results}
     parts = []
     for paper in papers:

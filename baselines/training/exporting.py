@@ -30,10 +30,6 @@ _COMPARED, _NEAR = 64, 1e-4
 def runtime(modules: Sequence[nn.Module], squash: str) -> Network:
     """The network of the compiled runtime with the layers of a PyTorch network.
 
-    Args:
-        modules: Linear layers with activations between them.
-        squash: See :class:`Network`.
-
     Raises:
         TypeError: There is another module, or activations of several kinds.
     """

@@ -35,18 +35,10 @@ class Folder:
         self.tensorboard = path / "tensorboard"
 
     def prepare(self, identity: Mapping[str, Any], *, resume: bool, overwrite: bool) -> dict[str, Any] | None:
-        """Prepares the folder for a run; the caller has locked it.
-
-        Args:
-            identity: Parts of `run.json` that must be equal in a run that is resumed.
-            resume: Whether to continue a run that exists.
-            overwrite: Whether to replace it.
-
-        Returns:
-            The `run.json` of the run to resume; None if there is none.
+        """Prepares the folder, which the caller has locked; gives the `run.json` of the run to resume, if there is one.
 
         Raises:
-            ResultsError: There is a run and neither flag is given, it is another run, or it cannot be read.
+            ResultsError: There is a run and neither flag is given, its identity is another, or it cannot be read.
         """
         there = resumed(self.run, {"format": FORMAT, **identity}, resume=resume, overwrite=overwrite)
         if there is None:

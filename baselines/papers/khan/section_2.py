@@ -30,11 +30,9 @@ VALUES = (-1.0, -0.1, -0.02, 0.1, 1.0)
 
 
 class Best(NamedTuple):
-    """The best of several runs.
+    """The largest error at the nominal points of the best of several runs in [m].
 
-    Attributes:
-        error: The largest error at the nominal points, in [m].
-        success: Whether no step diverged, and the error is below 1 % of the path's extent.
+    It is a success if no step diverged and the error is below 1 % of the path's extent.
     """
 
     error: float
@@ -42,14 +40,7 @@ class Best(NamedTuple):
 
 
 def best(runs: Runs, scenario: Scenario, transformation: str, values: Sequence[float] = VALUES) -> Best:
-    """The best run of `fixed_point` over A: with one iteration a step where points are held, else with ten.
-
-    Args:
-        runs: Plays the episodes.
-        scenario: The scenario.
-        transformation: That of `fixed_point`.
-        values: Values of A.
-    """
+    """The best run of `fixed_point` over A: with one iteration a step where points are held, else with ten."""
     counted = scenario.counted()[1:]
     given: dict[str, Any] = {"transformation": transformation, "iterations": 10 if counted.all() else 1}
     if scenario.arm.joints == 2:
