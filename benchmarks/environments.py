@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-import ikgym
+import ikgym  # noqa: F401  # registers the environment
 from benchmarks.measuring import FULL, Effort, medians
 from benchmarks.table import Table
 
@@ -21,8 +20,8 @@ MOST_IN_A_ROW = 1024
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
-    """Steps of one environment, of N, and whole episodes with their resets."""
-    return [_single_table(effort), *(_vector_table(rows, effort) for rows in effort.rows), _whole_table(effort)]
+    """Steps of one environment, and of N."""
+    return [_single_table(effort), *(_vector_table(rows, effort) for rows in effort.rows)]
 
 
 def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
@@ -76,19 +75,6 @@ def vector(rows: int) -> tuple[Calls, tuple[str, ...]]:
     return calls, tuple(skipped)
 
 
-def whole_episodes(rows: int, scenario: str = "varga7-random", steps: int | None = None) -> float:
-    """Steps per second of the native vector environment over a whole episode of each row, the resets included."""
-    given = ikgym.scenarios.get(scenario)
-    given = given if steps is None else given.replace(steps=steps)
-    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=given, autoreset_mode="SameStep")
-    step = _stepping(envs)
-    step()
-    begin = time.perf_counter()
-    for _ in range(given.steps):
-        step()
-    return rows * given.steps / (time.perf_counter() - begin)
-
-
 def _stepping(envs: Any, rows: int | None = None) -> Callable[[], object]:
     """A step with actions of 0, after a reset; ``rows`` where the action space is that of one row."""
     envs.reset() if rows else envs.reset(seed=0)
@@ -117,15 +103,4 @@ def _vector_table(rows: int, effort: Effort) -> Table:
         ("steps per second [10⁶/s]", "time × native, varga7-fast"),
         {name: (1e-6 * rows / t, t / reference) for name, t in times.items()},
         skipped,
-    )
-
-
-def _whole_table(effort: Effort) -> Table:
-    rows = min(effort.rows[-1], 1024)
-    steps = None if effort is FULL else effort.steps
-    return Table(
-        "Whole episodes, their resets included",
-        f"Scenario varga7-random, {rows:,} arms, one episode of each.",
-        ("steps per second [10⁶/s]",),
-        {"RedundantIK-v0 native, varga7-random": (1e-6 * whole_episodes(rows, steps=steps),)},
     )

@@ -141,29 +141,23 @@ def test_what_is_said_of_the_starts():
     assert free.spread == {"polished": 2, "polished_within_1e-6": 2, "without_search": 1e-16}
 
 
-@pytest.fixture(scope="module")
-def costly():
-    """Two paths of which the first is a hundred times too costly, their costs, and what they are paths of."""
+def test_the_local_search_finds_what_a_start_does_not():
+    """Of two paths the first is a hundred times too costly."""
     whole = EpisodeProblem.of(ikgym.scenarios.get("varga7-random"), 1_000_011)
     problem = whole.on(whole.coarse(25))
-    paths = np.empty((2, len(problem.grid.at), 7))
-    local_search.random_paths(problem, 0, paths, 0, 2)
+    before = np.empty((2, len(problem.grid.at), 7))
+    local_search.random_paths(problem, 0, before, 0, 2)
     improved = local_search.Improved(*np.empty((3, 2)))
-    local_search.improve(problem, NewtonSettings(False, 50, 1e-4), paths, improved, 0, 2)
-    return problem, paths, improved.costs
-
-
-def test_the_local_search_finds_what_a_start_does_not(costly):
-    problem, before, costs_before = costly
-    paths, costs = before.copy(), costs_before.copy()
+    local_search.improve(problem, NewtonSettings(False, 50, 1e-4), before, improved, 0, 2)
+    paths, costs = before.copy(), improved.costs.copy()
     local_search.iterated_local_search(problem, 0, 40, before, paths, costs, 0, 1)
-    assert costs[0] < 0.1 * costs_before[0]
-    assert costs[1] == costs_before[1]
+    assert costs[0] < 0.1 * improved.costs[0]
+    assert costs[1] == improved.costs[1]
     assert identical(paths[1], before[1])
 
 
 class TestGrid:
-    @pytest.mark.parametrize("steps", [1, 9, 37])
+    @pytest.mark.parametrize("steps", [1, 37])
     @pytest.mark.parametrize("stride", [1, 5])
     def test_a_coarse_grid_counts_all_steps(self, steps, stride):
         for held in (1, (2, 1, 1, 3, 1)):
@@ -265,24 +259,19 @@ class TestCache:
         files.append(cache.file_of(short(), 0, QUICK))
         assert len(set(files)) == len(files)
 
-    @pytest.mark.parametrize("how", ["half", "folder"])
-    def test_a_damaged_file_is_made_anew(self, folder, caplog, how):
+    def test_a_damaged_file_is_made_anew(self, folder, caplog):
         before = solve(short(), 0, QUICK)
         (file,) = kept(folder)
-        whole = file.read_bytes()
-        file.write_bytes(whole[: len(whole) // 2])
-        if how == "folder":
-            file.unlink()
-            file.mkdir()
-        after = solve(short(), 0, QUICK)
+        file.write_bytes(file.read_bytes()[:1000])
+        assert identical(solve(short(), 0, QUICK).q, before.q)
         assert "It is replaced." in caplog.text
-        assert identical(after.q, before.q)
-        if how == "folder":
-            assert "The optimum is not kept" in caplog.text
-        else:
-            caplog.clear()
-            solve(short(), 0, QUICK)
-            assert not caplog.text
+        caplog.clear()
+        solve(short(), 0, QUICK)
+        assert not caplog.text
+        file.unlink()
+        file.mkdir()
+        assert identical(solve(short(), 0, QUICK).q, before.q)
+        assert "The optimum is not kept" in caplog.text
 
 
 @pytest.mark.parametrize(
