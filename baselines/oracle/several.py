@@ -55,9 +55,7 @@ def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> 
 
 
 def find_all(
-    wanted: Sequence[Wanted],
-    workers: Workers = ALONE,
-    tick: Callable[[Wanted, float], None] = lambda one, share: None,
+    wanted: Sequence[Wanted], workers: Workers = ALONE, tick: Callable[[Wanted, float], None] = lambda one, share: None
 ) -> Iterator[tuple[Wanted, Optimum]]:
     """The cheapest paths that are found; by workers in the order in which they are done.
 

@@ -42,10 +42,7 @@ def runtime(modules: Sequence[nn.Module], squash: str) -> Network:
 
 
 def export(
-    model: BaseAlgorithm,
-    envs: LearningVecEnv,
-    file: str | pathlib.Path,
-    training: Mapping[str, Any] | None = None,
+    model: BaseAlgorithm, envs: LearningVecEnv, file: str | pathlib.Path, training: Mapping[str, Any] | None = None
 ) -> str:
     """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
 

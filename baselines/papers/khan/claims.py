@@ -107,10 +107,7 @@ def w_blocks_joints(runs: Runs) -> Finding:
 def w_keeps_precision(runs: Runs) -> Finding:
     before, after = _weighted(runs, Q1, BLOCKED)
     share = after.largest_position / extent(runs.scenario(Q1).nominal()[:, 9:])
-    holds = {
-        "beside the run without W": not after.worse(before),
-        "beside the extent": share < SAME,
-    }
+    holds = {"beside the run without W": not after.worse(before), "beside the extent": share < SAME}
     return Finding(holds, {**_before_and_after(before, after), "of the extent [%]": 100.0 * share})
 
 

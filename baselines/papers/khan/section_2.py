@@ -8,14 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.papers.comparisons import SAME, YANK, extent, rms
-from baselines.papers.faitli.episodes import (
-    REGULAR,
-    TRAJECTORIES,
-    jacobians,
-    nominal_joints,
-    short,
-    singular_places,
-)
+from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, nominal_joints, short, singular_places
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.status import Status

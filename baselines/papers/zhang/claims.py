@@ -26,16 +26,7 @@ from baselines.papers.zhang.episodes import (
     settled_error,
     settled_from,
 )
-from baselines.papers.zhang.targets import (
-    SHARES,
-    TARGETS,
-    at_rest,
-    drawn,
-    iterates,
-    met,
-    rank_correlation,
-    sugihara,
-)
+from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn, iterates, met, rank_correlation, sugihara
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.status import Status
 from ikgym import Plant

@@ -413,11 +413,7 @@ def test_a_record_is_reproduced():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "how"),
-    [
-        ("varga7-fast", 0, FROM_THE_PATH),
-        ("khan8-q1", 0, FROM_THE_PATH),
-        ("varga7-random", 2_000_000, Search()),
-    ],
+    [("varga7-fast", 0, FROM_THE_PATH), ("khan8-q1", 0, FROM_THE_PATH), ("varga7-random", 2_000_000, Search())],
 )
 def test_records_are_reproduced(name, seed, how):
     reproduced(name, seed, how)

@@ -33,12 +33,7 @@ def test_figures_in_words():
 
 @pytest.mark.parametrize(
     ("before", "after", "wanted"),
-    [
-        (1.0, 0.8, {"a": True}),
-        (0.8, 1.0, {"a": False}),
-        (1.0, 0.95, {}),
-        (0.0, 3.0, {"a": False}),
-    ],
+    [(1.0, 0.8, {"a": True}), (0.8, 1.0, {"a": False}), (1.0, 0.95, {}), (0.0, 3.0, {"a": False})],
 )
 def test_changes_of_less_than_a_tenth_decide_nothing(before, after, wanted):
     assert falls({"a": (before, after)}) == wanted
