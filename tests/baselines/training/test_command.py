@@ -142,13 +142,13 @@ def test_a_run_that_ends_early(patched, error, code, message, tmp_path, monkeypa
 @pytest.mark.slow
 def test_from_the_shell(tmp_path):
     """As a program of its own, with warnings as errors."""
-    arguments = [ROOT / "train.py", "apg", "--preset", "smoke", "--no-progress", "--out", "."]
+    arguments = [ROOT / "train.py", "apg", *TINY, "--out", "."]
     command = [sys.executable, "-W", "error", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert all(line.startswith("Compiling ") for line in done.stderr.splitlines())
     assert "written to ." in done.stdout
-    assert about(tmp_path / "seed-0")["command"].startswith("python train.py apg --preset smoke")
+    assert about(tmp_path / "seed-0")["command"].startswith("python train.py apg --scenario varga7-random")
 
 
 def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
