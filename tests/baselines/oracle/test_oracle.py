@@ -407,7 +407,7 @@ FROM_THE_PATH = Search(starts=0, generations=0)
 
 
 def test_a_record_is_reproduced():
-    reproduced("zhang6-lspb", 0, FROM_THE_PATH)
+    reproduced("tiago-fast", 0, FROM_THE_PATH)
 
 
 @pytest.mark.slow
