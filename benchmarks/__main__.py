@@ -48,7 +48,7 @@ def main(command: Command) -> list[Table]:
     done: list[Table] = []
     for section in command.sections:
         for table in SECTIONS[section](QUICK if command.quick else FULL):
-            print(f"\n{table.text()}", flush=True)
+            print(f"\n{table.markdown()}", flush=True)
             done.append(table)
     run = {
         "command": " ".join(["python -m benchmarks", *sys.argv[1:]]),

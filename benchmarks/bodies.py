@@ -10,7 +10,7 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 import ikgym
-from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.measuring import FULL, Effort, per_item
 from benchmarks.poses import pinocchio_model
 from benchmarks.table import Table
 from ikgym.arms import Arm
@@ -48,12 +48,10 @@ def kernels(arm: Arm, obstacles: Sequence[Box]) -> dict[str, tuple[Callable[[], 
     counts, near = np.empty(LOOP, dtype=np.int64), np.empty((LOOP, MOST))
     near_pairs, gradients = np.empty((LOOP, MOST, 2), dtype=np.int64), np.empty((LOOP, MOST, arm.joints))
     near_to = (NEAR, counts, near, near_pairs, gradients)
+    given = arm.chain, shapes, *around, q
     return {
-        "ikgym, the smallest": (lambda: clearance_rows(arm.chain, shapes, *around, q, distances, pairs), LOOP),
-        f"ikgym, all within {NEAR:g} m, with gradients": (
-            lambda: near_rows(arm.chain, shapes, *around, q, *near_to),
-            LOOP,
-        ),
+        "ikgym, the smallest": (lambda: clearance_rows(*given, distances, pairs), LOOP),
+        f"ikgym, all within {NEAR:g} m, with gradients": (lambda: near_rows(*given, *near_to), LOOP),
         "ikgym Arm.clearance, one call": (lambda: arm.clearance(q[0], obstacles), 1),
     }
 
@@ -89,9 +87,6 @@ def tables(effort: Effort = FULL) -> list[Table]:
             measure(row)
 
     calls["coal by pin.computeDistances, all distances"] = (loop, LOOP)
-    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
-    per_posture = {name: t / calls[name][1] for name, t in times.items()}
-    fastest = next(iter(per_posture.values()))
     around = arm.bodies.surroundings(obstacles)
     return [
         Table(
@@ -100,6 +95,6 @@ def tables(effort: Effort = FULL) -> list[Table]:
             f"at {LOOP} random postures, forward kinematics included, one thread, medians. coal measures pair by pair "
             "in one call a posture, without a broad phase.",
             ("per posture [µs]", "× the smallest"),
-            {name: (1e6 * t, t / fastest) for name, t in per_posture.items()},
+            per_item(calls, effort),
         )
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -10,24 +9,35 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-import ikgym
+import ikgym  # noqa: F401  # registers the environment
 from benchmarks.measuring import FULL, Effort, medians
 from benchmarks.table import Table
 
-Calls = dict[str, Callable[[], object]]
-OURS = "RedundantIK-v0, varga7-fast"
+OURS = "RedundantIK-v0"
+SCENARIOS = ("varga7-fast", "varga7-random")
 #: Gymnasium steps its environments one by one: more of them would only take longer.
 MOST_IN_A_ROW = 1024
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
-    """Steps of one environment, of N, and whole episodes with their resets."""
-    return [_single_table(effort), *(_vector_table(rows, effort) for rows in effort.rows), _whole_table(effort)]
+    """Steps of one environment, and of N."""
+    return [_single(effort), *(_vector(rows, effort) for rows in effort.rows)]
 
 
-def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
-    """One step of a single environment with a fixed action; ended episodes are reset."""
-    env = gym.make(env_id, **kwargs)
+def _single(effort: Effort) -> Table:
+    calls = {f"{OURS}, {scenario}": _step(gym.make(OURS, scenario=scenario)) for scenario in SCENARIOS}
+    calls |= {name: _step(gym.make(name)) for name in ("Pendulum-v1", "Reacher-v5")}
+    times = medians(calls, effort.rounds, effort.seconds)
+    return Table(
+        "One step of one environment",
+        "Through `gym.make` with its usual wrappers, a fixed action, the resets of ended episodes included; medians.",
+        ("step [µs]", "× varga7-fast"),
+        {name: (1e6 * t, t / next(iter(times.values()))) for name, t in times.items()},
+    )
+
+
+def _step(env: gym.Env[Any, Any]) -> Callable[[], None]:
+    """One step with a fixed action; ended episodes are reset."""
     env.reset(seed=0)
     env.action_space.seed(0)
     action = env.action_space.sample() * 0.01
@@ -40,97 +50,37 @@ def stepper(env_id: str, **kwargs: Any) -> Callable[[], None]:
     return step
 
 
-def single() -> tuple[Calls, tuple[str, ...]]:
-    """Steps through `gym.make` by name, and what is left out."""
-    calls: Calls = {
-        OURS: stepper("RedundantIK-v0", scenario="varga7-fast"),
-        "RedundantIK-v0, varga7-random": stepper("RedundantIK-v0", scenario="varga7-random"),
-        "Pendulum-v1": stepper("Pendulum-v1"),
-    }
-    try:
-        calls["Reacher-v5"] = stepper("Reacher-v5")
-    except (ImportError, gym.error.DependencyNotInstalled) as e:
-        return calls, (f"Reacher-v5: {e}",)
-    return calls, ()
-
-
-def vector(rows: int) -> tuple[Calls, tuple[str, ...]]:
-    """Steps of vector environments by name, each of all its rows, and what is left out."""
-    calls, skipped = {}, []
-    for scenario in ("varga7-fast", "varga7-random"):
-        calls[f"RedundantIK-v0 native, {scenario}"] = _stepping(
-            gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario)
-        )
-    if rows <= MOST_IN_A_ROW:
-        calls["Pendulum-v1, Gymnasium's SyncVectorEnv"] = _stepping(
-            gym.make_vec("Pendulum-v1", num_envs=rows, vectorization_mode="sync")
-        )
+def _vector(rows: int, effort: Effort) -> Table:
+    skipped, few = [], rows <= MOST_IN_A_ROW
+    made = {f"{OURS} native, {scenario}": gym.make_vec(OURS, rows, scenario=scenario) for scenario in SCENARIOS}
+    if few:
+        made["Pendulum-v1, Gymnasium's SyncVectorEnv"] = gym.make_vec("Pendulum-v1", rows, vectorization_mode="sync")
     else:
         skipped.append(f"SyncVectorEnv with more than {MOST_IN_A_ROW} environments")
+    calls: dict[str, Callable[[], object]] = {name: _steps(envs) for name, envs in made.items()}
     try:
         import envpool
+
+        # The 16,384 simulations of MuJoCo take ten seconds to make.
+        for name in ("Pendulum-v1", "Reacher-v5") if few else ("Pendulum-v1",):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # its boxes are float64, and Gymnasium minds
+                calls[f"{name}, EnvPool"] = _steps(envpool.make_gymnasium(name, num_envs=rows, seed=0), rows)
     except ImportError as e:
-        return calls, (*skipped, f"EnvPool: {e}")
-    # The 16,384 simulations of MuJoCo take ten seconds to make.
-    for name in ("Pendulum-v1", "Reacher-v5") if rows <= MOST_IN_A_ROW else ("Pendulum-v1",):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # its boxes are float64, and Gymnasium minds
-            calls[f"{name}, EnvPool"] = _stepping(envpool.make_gymnasium(name, num_envs=rows, seed=0), rows)
-    return calls, tuple(skipped)
-
-
-def whole_episodes(rows: int, scenario: str = "varga7-random", steps: int | None = None) -> float:
-    """Steps per second of the native vector environment over a whole episode of each row, the resets included."""
-    given = ikgym.scenarios.get(scenario)
-    given = given if steps is None else given.replace(steps=steps)
-    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=given, autoreset_mode="SameStep")
-    step = _stepping(envs)
-    step()
-    begin = time.perf_counter()
-    for _ in range(given.steps):
-        step()
-    return rows * given.steps / (time.perf_counter() - begin)
-
-
-def _stepping(envs: Any, rows: int | None = None) -> Callable[[], object]:
-    """A step with actions of 0, after a reset; ``rows`` where the action space is that of one row."""
-    envs.reset() if rows else envs.reset(seed=0)
-    actions = np.zeros((*((rows,) if rows else ()), *envs.action_space.shape), dtype=envs.action_space.dtype)
-    return lambda: envs.step(actions)
-
-
-def _single_table(effort: Effort) -> Table:
-    calls, skipped = single()
+        skipped.append(f"EnvPool: {e}")
     times = medians(calls, effort.rounds, effort.seconds)
-    return Table(
-        "One step of one environment",
-        "Through `gym.make` with its usual wrappers, a fixed action, the resets of ended episodes included; medians.",
-        ("step [µs]", "× varga7-fast"),
-        {name: (1e6 * t, t / times[OURS]) for name, t in times.items()},
-        skipped,
-    )
-
-
-def _vector_table(rows: int, effort: Effort) -> Table:
-    calls, skipped = vector(rows)
-    times = medians(calls, effort.rounds, effort.seconds)
-    reference = next(iter(times.values()))
     return Table(
         f"Steps of {rows:,} environments at once",
         "Actions of 0, as many threads as the environment chooses, medians. Ended episodes are reset: after "
         "3000 steps of RedundantIK-v0, 200 of Pendulum-v1, 50 of Reacher-v5.",
         ("steps per second [10⁶/s]", "time × native, varga7-fast"),
-        {name: (1e-6 * rows / t, t / reference) for name, t in times.items()},
-        skipped,
+        {name: (1e-6 * rows / t, t / next(iter(times.values()))) for name, t in times.items()},
+        tuple(skipped),
     )
 
 
-def _whole_table(effort: Effort) -> Table:
-    rows = min(effort.rows[-1], 1024)
-    steps = None if effort is FULL else effort.steps
-    return Table(
-        "Whole episodes, their resets included",
-        f"Scenario varga7-random, {rows:,} arms, one episode of each.",
-        ("steps per second [10⁶/s]",),
-        {"RedundantIK-v0 native, varga7-random": (1e-6 * whole_episodes(rows, steps=steps),)},
-    )
+def _steps(envs: Any, rows: int | None = None) -> Callable[[], object]:
+    """A step with actions of 0, after a reset; ``rows`` where the action space is that of one row."""
+    envs.reset() if rows else envs.reset(seed=0)
+    actions = np.zeros((*((rows,) if rows else ()), *envs.action_space.shape), dtype=envs.action_space.dtype)
+    return lambda: envs.step(actions)

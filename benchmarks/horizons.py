@@ -1,97 +1,132 @@
-"""The receding horizon beside gradient descent, IPOPT and Crocoddyl: time of a solve, and the cost that it reaches."""
+"""The receding horizon beside gradient descent and IPOPT: time of a solve, and the cost that it reaches."""
 
 from __future__ import annotations
 
+import itertools
 import statistics
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 
 import baselines
 import ikgym
-from benchmarks.horizon_solvers import EXACT, Observation, policies, rivals
+from baselines.policy import Problem, SolverPolicy
+from baselines.solvers.receding_horizon.rhc import RecedingHorizon
+from baselines.status import Status
 from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.rivals.casadi_horizon import CasadiHorizon
+from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
 from benchmarks.table import Table
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
-SCENARIOS = ("varga7-fast", "varga7-slow")
+SCENARIO = "varga7-fast"
+#: The exact solver, to which all times are compared, and IPOPT through CasADi.
+EXACT, IPOPT = "rhc", "CasADi, IPOPT"
+#: Policies by label: name, parameters, and the longest horizon at which it does not take seconds.
+POLICIES: dict[str, tuple[str, dict[str, Any], int]] = {
+    EXACT: ("rhc", {}, 1000),
+    "rhc, one Newton step a call": ("rhc", {"iterations": 1}, 1000),
+    "rhc_gradient, analytic": ("rhc_gradient", {"gradient": "analytic", "tolerance": 0.0}, 1000),
+    "rhc_gradient, differences": ("rhc_gradient", {"tolerance": 0.0}, 30),
+}
 CONDITIONS = (
     "At {states} states of an episode of rhc, one arm, one thread. Each solver starts from its own plan of the step "
     "before, after {lead} such steps; solve is the median over the states, slowest the slowest of them, each the "
     "median of {solves} interleaved calls. Iterations, converged (the share of states at which the solver reports "
     "convergence) and cost are means; excess is the fraction by which the cost is above the lowest of all solvers at "
     "that state, median and worst. rhc_gradient makes 450 steps, the paper's limit, or fewer if it diverges. IPOPT's "
-    "barrier leaves about 1e-9 of cost, a large fraction of a tiny one. Crocoddyl calls a compiled cost through "
-    "Python, its only interface for this one."
+    "barrier leaves about 1e-9 of cost, a large fraction of a tiny one."
 )
-COLUMNS = (*("solve [µs]", "slowest [µs]", f"× {EXACT}", "iterations", "converged", "cost", "excess", "worst excess"),)
+COLUMNS = ("solve [µs]", "slowest [µs]", f"× {EXACT}", "iterations", "converged", "cost", "excess", "worst excess")
+Observation = dict[str, FloatArray]
+
+
+class Solve(NamedTuple):
+    """A call that solves a state, to be timed, and the function that makes a plan of its result."""
+
+    call: Callable[[], Any]
+    plan: Callable[[Any], Plan]
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
-    """One table per scenario and horizon."""
-    first, *others = ((scenario, grid) for scenario in SCENARIOS for grid in effort.grids)
-    conditions = CONDITIONS.format(states=effort.states, lead=effort.lead, solves=effort.solves)
-    return [
-        _table(*first, effort, conditions),
-        *(
-            _table(*case, effort, "States, columns and conditions as in the first table of horizons.")
-            for case in others
-        ),
-    ]
+    """One table per horizon."""
+    texts = itertools.chain(
+        [CONDITIONS.format(states=effort.states, lead=effort.lead, solves=effort.solves)],
+        itertools.repeat("States, columns and conditions as in the first table of horizons."),
+    )
+    return [_table(ikgym.scenarios.get(SCENARIO), grid, effort, next(texts)) for grid in effort.grids]
 
 
-def _table(name: str, grid: int, effort: Effort, conditions: str) -> Table:
-    scenario = ikgym.scenarios.get(name)
+def _table(scenario: Scenario, grid: int, effort: Effort, conditions: str) -> Table:
     states = along(scenario, grid - 1, effort.states, effort.lead)
-    others, skipped = rivals(scenario, grid)
-    warmed = {
-        (label, i): solver.warmed(state)
-        for label, solver in (policies(scenario, grid) | others).items()
-        for i, state in enumerate(states)
-    }
-    calls: dict[tuple[str, int], Callable[[], Any]] = {key: call for key, (call, _) in warmed.items()}
-    answers = {key: answer(call()) for key, (call, answer) in warmed.items()}
+    solves = [solvers(scenario, grid, state) for state in states]
     # One call a turn: the slow ones would take minutes otherwise, and the fast ones have as many turns.
+    calls = {(label, i): one.call for i, some in enumerate(solves) for label, one in some.items()}
+    plans = [{label: one.plan(one.call()) for label, one in some.items()} for some in solves]
     times = medians(calls, effort.solves, 0.0)
-    labels = list(dict.fromkeys(label for label, _ in warmed))
-    best = [min(answers[label, i].cost for label in labels) for i in range(len(states))]
+    best = [min(plan.cost for plan in some.values()) for some in plans]
+    reference = statistics.median(times[EXACT, i] for i in range(len(states)))
     rows: dict[str, tuple[float | None, ...]] = {}
-    reference = None
-    for label in labels:
-        spent = [times[label, i] for i in range(len(states))]
-        reached = [answers[label, i] for i in range(len(states))]
-        excess = [answer.cost / lowest - 1.0 for answer, lowest in zip(reached, best, strict=True)]
+    for label in solves[0]:
+        spent, reached = [times[label, i] for i in range(len(states))], [some[label] for some in plans]
+        excess = [plan.cost / lowest - 1.0 for plan, lowest in zip(reached, best, strict=True)]
         middle = statistics.median(spent)
-        reference = middle if label == EXACT else reference
-        rows[label] = (
-            1e6 * middle,
-            1e6 * max(spent),
-            None if reference is None else middle / reference,
-            statistics.fmean(answer.iterations for answer in reached),
-            statistics.fmean(answer.converged for answer in reached),
-            statistics.fmean(answer.cost for answer in reached),
-            statistics.median(excess),
-            max(excess),
-        )
-    return Table(f"A horizon of {grid} grid points in {name}", conditions, COLUMNS, rows, skipped)
+        means = [
+            statistics.fmean(getattr(plan, key) for plan in reached) for key in ("iterations", "converged", "cost")
+        ]
+        costs = statistics.median(excess), max(excess)
+        rows[label] = 1e6 * middle, 1e6 * max(spent), middle / reference, *means, *costs
+    return Table(f"A horizon of {grid} grid points in {scenario.name}", conditions, COLUMNS, rows)
+
+
+def solvers(scenario: Scenario, grid: int, observations: Sequence[Observation]) -> dict[str, Solve]:
+    """The solvers of a horizon of HL grid points by label, at the last of some states; each has solved those before."""
+    out = {
+        label: _policy(baselines.make(name, scenario, horizon=grid, **parameters), observations)
+        for label, (name, parameters, most) in POLICIES.items()
+        if grid <= most
+    }
+    return {**out, IPOPT: _ipopt(CasadiHorizon(Problem.of(scenario), grid - 1), observations)}
+
+
+def _policy(policy: SolverPolicy, observations: Sequence[Observation]) -> Solve:
+    state, last = None, observations[-1]
+    for observation in observations[:-1]:
+        _, state = policy.predict(observation, state)
+
+    def plan(result: Any) -> Plan:
+        q = plan_of(policy, last, result[1])
+        cost = plan_cost(policy.problem, Horizon(last["q"], last["nominal"][: len(q)]), q)
+        status, iterations = (int(array[0]) for array in policy.report(result[1]))
+        return Plan(q, cost, iterations, status in (Status.CONVERGED, Status.SATURATED))
+
+    return Solve(lambda: policy.predict(last, state), plan)
+
+
+def _ipopt(solver: CasadiHorizon, observations: Sequence[Observation]) -> Solve:
+    """It starts from its last plan, shifted by a step."""
+    start, horizons = None, [Horizon(o["q"], o["nominal"][: solver.knots]) for o in observations]
+    for horizon in horizons[:-1]:
+        q = solver.solve(horizon, start).q
+        start = np.vstack([q[1:], q[-1:]])
+    return Solve(lambda: solver.solve(horizons[-1], start), lambda plan: plan)
+
+
+def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> FloatArray:
+    """The joint coordinates at the knots of a policy's plan. Shape (K, n)."""
+    if isinstance(policy, RecedingHorizon):
+        plan: FloatArray = policy.plan(state)[0]
+        return plan
+    qdot: FloatArray = state[2][0]  # those of gradient descent are velocities
+    out: FloatArray = observation["q"] + policy.problem.dt * np.cumsum(qdot, axis=0)
+    return out
 
 
 def along(scenario: Scenario, preview: int, count: int, lead: int) -> list[list[Observation]]:
-    """States of an episode of a receding horizon, evenly spread, each at the end of the steps that lead to it.
-
-    The episode is one of `rhc` with the same horizon, since its solver has to be fast where it leads.
-
-    Args:
-        scenario: The scenario.
-        preview: Steps of the nominal trajectory that the observations show.
-        count: The number of states.
-        lead: Steps shown before each of them.
-
-    Returns:
-        For each state, the ``lead + 1`` observations up to it.
-    """
+    """States of an episode of `rhc` with that horizon, evenly spread, each after ``lead`` others that lead to it."""
     policy = baselines.make("rhc", scenario, horizon=preview + 1)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=preview)
     observation, _ = env.reset(seed=0)

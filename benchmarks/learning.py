@@ -96,12 +96,11 @@ def table(lines: Sequence[Line]) -> list[Line]:
         last = [line for line in found if line["test_log_cost"]]
         cost = np.expm1([[float(line["test_log_cost"])] for line in last])
         score = rl.score({group[0]: cost})[group[0]]
-        medians = {name: float(np.median([float(one[name]) for one in last])) for name in ("steps", "core_seconds")}
-        effort = {"steps": int(medians["steps"]), "core_minutes": round(medians["core_seconds"] / 60.0, 1)}
+        steps, seconds = (float(np.median([float(one[name]) for one in last])) for name in ("steps", "core_seconds"))
+        effort = {"steps": int(steps), "core_minutes": round(seconds / 60.0, 1)}
         scores = {"score": score.mean, "low": score.low, "high": score.high, "best": score.best}
-        counted = {"seeds": len(last), "episodes": EPISODES, **effort}
-        rounded = {name: round(value, 3) for name, value in scores.items()}
-        out.append({**dict(zip(GROUP, group, strict=True)), **counted, **rounded})
+        line = dict(zip(GROUP, group, strict=True)) | {"seeds": len(last), "episodes": EPISODES, **effort}
+        out.append({**line, **{name: round(value, 3) for name, value in scores.items()}})
     return out
 
 

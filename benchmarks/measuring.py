@@ -45,14 +45,10 @@ QUICK = Effort(rounds=1, seconds=0.0, rows=(3,), steps=3, grids=(3,), states=1, 
 
 
 def medians(calls: Mapping[Name, Call], rounds: int = 15, seconds: float = 0.05) -> dict[Name, float]:
-    """The median time of each call in [s].
+    """The median time of each call in [s], over some turns of about so many seconds, of at least one call.
 
-    Machines are noisy: the calls take turns, round by round, so that a slow period affects all alike.
-
-    Args:
-        calls: The calls by name. Each is made once before anything is timed.
-        rounds: Number of turns of each call.
-        seconds: About how long a turn lasts; never less than one call.
+    Machines are noisy: the calls take turns, round by round, so that a slow period affects all alike. Each is made once
+    before anything is timed.
     """
     repeats = {}
     for name, call in calls.items():
@@ -63,6 +59,14 @@ def medians(calls: Mapping[Name, Call], rounds: int = 15, seconds: float = 0.05)
         for name, call in calls.items():
             times[name].append(_time(call, repeats[name]))
     return {name: statistics.median(values) for name, values in times.items()}
+
+
+def per_item(calls: Mapping[str, tuple[Call, int]], effort: Effort) -> dict[str, tuple[float | None, ...]]:
+    """Rows of a table of calls with their numbers of items: the time of an item in [µs], and that over the first's."""
+    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
+    each = {name: t / calls[name][1] for name, t in times.items()}
+    first = next(iter(each.values()))
+    return {name: (1e6 * t, t / first) for name, t in each.items()}
 
 
 def _time(call: Call, repeats: int) -> float:

@@ -107,10 +107,7 @@ def _one_by_one(solve: Callable[[FloatArray], FloatArray | None]) -> Solve:
     return solve_all
 
 
-OURS: Mapping[str, Callable[[Arm], Solve]] = {
-    "ikgym, one call for all": together,
-    "ikgym, one call a pose": single,
-}
+OURS: Mapping[str, Callable[[Arm], Solve]] = {"ikgym, one call for all": together, "ikgym, one call a pose": single}
 RIVALS: Mapping[str, Callable[[Arm], Solve]] = {
     "roboticstoolbox, C++ LM": roboticstoolbox,
     "pytracik": pytracik,

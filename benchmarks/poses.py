@@ -10,7 +10,7 @@ import pinocchio as pin
 from numba import njit
 
 import ikgym
-from benchmarks.measuring import FULL, Effort, medians
+from benchmarks.measuring import FULL, Effort, per_item
 from benchmarks.pose_solvers import MET, OURS, REFERENCE, RIVALS, Solve
 from benchmarks.table import Table
 from ikgym.arms import Arm
@@ -33,15 +33,11 @@ def tables(effort: Effort = FULL) -> list[Table]:
 
 
 def _forward_table(effort: Effort) -> Table:
-    calls = kinematics()
-    times = medians({name: call for name, (call, _) in calls.items()}, effort.rounds, effort.seconds)
-    per_pose = {name: t / calls[name][1] for name, t in times.items()}
-    fastest = next(iter(per_pose.values()))
     return Table(
         "Forward kinematics and Jacobian, 7 joints",
         "The arm varga7 at random configurations, one thread, medians.",
         ("per pose [µs]", "× compiled loop"),
-        {name: (1e6 * t, t / fastest) for name, t in per_pose.items()},
+        per_item(kinematics(), effort),
     )
 
 

@@ -11,7 +11,7 @@ from baselines.evaluation.metrics import describe
 from baselines.evaluation.table import number
 
 #: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.metrics.describe`.
-LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "crocoddyl", "stable-baselines3", "torch")
+LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "stable-baselines3", "torch")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,24 +32,10 @@ class Table:
     rows: dict[str, tuple[float | None, ...]]
     skipped: tuple[str, ...] = ()
 
-    def cells(self) -> list[list[str]]:
-        """Head and rows as text."""
-        return [["", *self.columns], *([name, *(number(value) for value in row)] for name, row in self.rows.items())]
-
-    def text(self) -> str:
-        """For the terminal, without the conditions."""
-        cells = self.cells()
-        widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
-        lines = [
-            "  ".join([line[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(line[1:], widths[1:], strict=True))])
-            for line in cells
-        ]
-        notes = [f"left out: {why}" for why in self.skipped]
-        return "\n".join([self.title, *(f"  {line}".rstrip() for line in lines), *notes])
-
     def markdown(self) -> str:
         """With heading and conditions."""
-        head, *rows = (f"| {' | '.join(line)} |" for line in self.cells())
+        cells = [["", *self.columns], *([name, *map(number, row)] for name, row in self.rows.items())]
+        head, *rows = (f"| {' | '.join(line)} |" for line in cells)
         ruler = f"| :-- |{' --: |' * len(self.columns)}"
         notes = ["", *(f"- left out: {why}" for why in self.skipped)] if self.skipped else []
         return "\n".join([f"## {self.title}", "", self.conditions, "", head, ruler, *rows, *notes])

@@ -129,11 +129,7 @@ def _learner(name: str, files: Sequence[Path]) -> Played:
 
 
 def play(model: Any, task: Task, scenario: str, seeds: Sequence[int]) -> tuple[FloatArray, BoolArray]:
-    """Plays whole episodes with a model of Stable-Baselines3.
-
-    Returns:
-        The benchmark's costs, and whether arms were lost. Shapes (e,).
-    """
+    """Benchmark costs of whole episodes with a model of Stable-Baselines3, and whether arms were lost. Shapes (e,)."""
     costs, worst = np.zeros(len(seeds)), np.zeros((2, 1))
     for infos in scoring.play(model, task.replace(scenario=scenario), seeds):
         costs += infos["tracking_cost"] + infos["velocity_cost"]

@@ -41,14 +41,7 @@ UPRIGHT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def circle(arm: ikgym.Arm, start: npt.ArrayLike, period: float, seconds: float = SECONDS) -> ikgym.Scenario:
-    """A scenario whose tool goes upright on the circle, from where the arm stands.
-
-    Args:
-        arm: The arm.
-        start: Its joint coordinates in [rad] or [m]. Shape (n,).
-        period: Δt in [s].
-        seconds: How long it is played.
-    """
+    """A scenario whose tool goes upright on the circle, from joint coordinates (n,) in [rad] or [m]; Δt in [s]."""
     rotation, position = arm.forward(start)
     path = Circle(position - 0.1 * UPRIGHT[:, 0], 0.1, rotation=UPRIGHT)
     trajectory = PathTrajectory(path, Trapezoidal(0.1, 0.5), FixedOrientation(rotation))
@@ -86,11 +79,8 @@ def measured(policy: str, told: str, period: float, lag: float | None, delay: in
     known = {"perfect": Drives(), "given": drives, "identify": "identify"}[told]
     errors, commands = played(Controller(scenario, policy, known, guards=lost), with_drives(scenario, drives))
     line = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
-    error, times = (
-        1e6 * errors[round(FIRST / period) :].max(),
-        (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max(),
-    )
-    return line | {"error_um": float(error), "times_peak": float(times)}
+    times = (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max()
+    return line | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}
 
 
 def table() -> list[tuple[str, ...]]:
@@ -110,12 +100,8 @@ def table() -> list[tuple[str, ...]]:
 
 def _cell(line: Mapping[str, str]) -> str:
     """Error in [µm] and peak, with two digits."""
-    error = float(line["error_um"])
-    return (
-        f"{error:,.0f}, {float(line['times_peak']):.2g}"
-        if error >= 10.0
-        else f"{error:.2g}, {float(line['times_peak']):.2g}"
-    )
+    error, peak = float(line["error_um"]), float(line["times_peak"])
+    return f"{error:,.0f}, {peak:.2g}" if error >= 10.0 else f"{error:.2g}, {peak:.2g}"
 
 
 def main() -> None:

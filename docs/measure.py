@@ -56,19 +56,8 @@ ADAPTIVE: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 #: Columns of `bodies`.
-BODIES = (
-    "scenario",
-    "policy",
-    "episodes",
-    "relative_to",
-    "cost_ratio",
-    "low",
-    "high",
-    "error_mm",
-    "stopped_percent",
-    "clearance_mm",
-    "time_p50_us",
-)
+COSTS = ("scenario", "policy", "episodes", "relative_to", "cost_ratio", "low", "high")
+BODIES = (*COSTS, "error_mm", "stopped_percent", "clearance_mm", "time_p50_us")
 
 #: Steps over which times in batches are taken: a multiple of all intervals.
 BATCHED = 256
@@ -138,15 +127,13 @@ def _by_episodes(lines: Sequence[Line]) -> Iterable[list[Line]]:
 def _played(name: str, scenario: str, lines: Sequence[Line], episodes: int) -> list[Line]:
     """Lines with the same scenario, measured."""
     played = [policy for line in lines for policy in policies(line)]
-    folder = WORK / f"{name}-{scenario}-{episodes}"
-    options: Any = {
-        "episodes": episodes,
-        "timed": TIMED,
-        "out": folder,
-        "resume": True,
-        "report": False,
-    }
-    return records(evaluate(scenario, played, progress=True, **options), [line["policy"] for line in lines])
+    rows = evaluate(scenario, played, episodes=episodes, **kept(f"{name}-{scenario}-{episodes}"))
+    return records(rows, [line["policy"] for line in lines])
+
+
+def kept(name: str) -> dict[str, Any]:
+    """Options of an evaluation that continues where it was."""
+    return {"timed": TIMED, "out": WORK / name, "resume": True, "report": False, "progress": True}
 
 
 def untrained() -> None:
@@ -203,14 +190,8 @@ def intervals(*, only_new: bool = False, only_times: bool = False) -> list[Line]
     return out
 
 
-def periods(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
-    """Cost and times of policies on the same motions at longer control periods, measured as a whole.
-
-    Raises:
-        SystemExit: A part alone is asked for.
-    """
-    if only_new or only_times:
-        raise SystemExit("periods: costs are relative to the lowest in the table, which is measured as a whole.")
+def periods() -> list[Line]:
+    """Cost and times of policies on the same motions at longer control periods."""
     old, usual, out = from_csv((RESULTS / "periods.csv").read_text(encoding="utf-8")), ikgym.scenarios.get(SCENARIO), []
     for period, some in itertools.groupby(old, lambda line: line["period_ms"]):
         lines, dt = list(some), 1e-3 * float(period)
@@ -224,28 +205,17 @@ def periods(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
     return out
 
 
-def bodies(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
-    """Costs, stops and clearances in scenarios with bodies, measured as a whole.
-
-    Raises:
-        SystemExit: A part alone is asked for.
-    """
-    if only_new or only_times:
-        raise SystemExit("bodies: costs are relative to the lowest in the table, which is measured as a whole.")
-    out = []
-    for scenario, some in itertools.groupby(from_csv((RESULTS / "bodies.csv").read_text(encoding="utf-8")), _scenario):
+def bodies() -> list[Line]:
+    """Costs, stops and clearances in scenarios with bodies."""
+    old, out = from_csv((RESULTS / "bodies.csv").read_text(encoding="utf-8")), []
+    for scenario, some in itertools.groupby(old, lambda line: line["scenario"]):
         lines = list(some)
         played, episodes = [line["policy"] for line in lines], int(lines[0]["episodes"])
-        kept: dict[str, Any] = {"out": WORK / f"bodies-{scenario}", "resume": True, "report": False}
-        rows = evaluate(scenario, played, episodes=episodes, timed=TIMED, progress=True, **kept)
+        rows = evaluate(scenario, played, episodes=episodes, **kept(f"bodies-{scenario}"))
         errors = {name: max(row.position_error_max for row in rows if row.policy == name) for name in played}
         found = [{**record, "error_mm": 1e3 * errors[record["policy"]]} for record in records(rows, played)]
         out += [{column: record[column] for column in BODIES} for record in found]
     return out
-
-
-def _scenario(line: Line) -> str:
-    return str(line["scenario"])
 
 
 def plants(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
@@ -274,19 +244,19 @@ def _batch_time(scenario: ikgym.Scenario, policy: Any, seeds: Sequence[int]) -> 
     return 1e6 * spent / (BATCHED * len(seeds))
 
 
+#: Tables that are measured as a whole, and others with columns of their own.
+WHOLE = {"bodies": bodies, "periods": periods}
+OWN = {"agents_interval": intervals, "contexts": contexts.measured, "plants": plants}
+
+
 def main(command: Command) -> None:
     """Writes the tables."""
     untrained()
     for name in command.tables:
-        own = {
-            "agents_interval": intervals,
-            "bodies": bodies,
-            "contexts": contexts.measured,
-            "periods": periods,
-            "plants": plants,
-        }
-        make = own.get(name, functools.partial(measured, name))
-        new = make(only_new=command.new, only_times=command.times)
+        if name in WHOLE and (command.new or command.times):
+            raise SystemExit(f"{name}: costs are relative to the lowest in the table, which is measured as a whole.")
+        make = OWN.get(name, functools.partial(measured, name))
+        new = WHOLE[name]() if name in WHOLE else make(only_new=command.new, only_times=command.times)
         write(RESULTS / f"{name}.csv", to_csv(new).encode())
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
             shutil.rmtree(folder)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import PIL.Image
 
+from baselines.evaluation.records import from_csv
 from baselines.files import write
 from baselines.papers import PAPERS, ledger
 
@@ -22,7 +23,7 @@ COLOURS = 32
 
 def claims() -> str:
     """The tables of all claims, in Markdown."""
-    return ledger.markdown(list(PAPERS.values()), ledger.from_csv(RESULTS.read_text(encoding="utf-8")))
+    return ledger.markdown(list(PAPERS.values()), from_csv(RESULTS.read_text(encoding="utf-8")))
 
 
 def main() -> None:

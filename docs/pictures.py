@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +15,6 @@ from baselines.episodes import rollout
 from baselines.evaluation.plots import comparison, style
 from baselines.evaluation.records import from_csv
 from baselines.files import write
-from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 IMAGES = Path(__file__).parent / "images"
@@ -28,68 +27,44 @@ CLOSE, AROUND = 0.3, 100
 REFERENCE = {"color": style.INK, "ls": (0, (3, 2))}
 
 
-class Track(NamedTuple):
-    """Parts of the picture of an episode.
-
-    Args:
-        q: Joint coordinates in [rad] or [m]. Shape (steps, n).
-        points: Where the tool was, in [m]. Shape (steps, 3).
-        error: The position error in [m]. Shape (steps,).
-    """
-
-    q: FloatArray
-    points: FloatArray
-    error: FloatArray
-
-
-def play(scenario: Scenario, name: str) -> Track:
-    """An episode of a policy."""
-    policy = baselines.make(name, scenario)
-    episode = rollout(scenario, policy, 0, preview=policy.preview)
-    return Track(episode.q, scenario.arm.forward(episode.q)[1], episode.position_error)
-
-
 def draw() -> Figure:
     """The arm on its way, the place where its path leaves the reference furthest, and the errors."""
     scenario = ikgym.scenarios.get(SCENARIO)
     # The task coordinates end with the position.
     reference = scenario.nominal(0)[1 : scenario.steps + 1, -3:]
-    tracks = {name: play(scenario, name) for name in POLICIES}
-    first = tracks[POLICIES[0]]
-    step = _furthest(first.points, reference)
+    policies = {name: baselines.make(name, scenario) for name in POLICIES}
+    episodes = {name: rollout(scenario, policy, 0, preview=policy.preview) for name, policy in policies.items()}
+    paths = {name: scenario.arm.forward(one.q)[1] for name, one in episodes.items()}
+    first = paths[POLICIES[0]]
+    # The step at which it is furthest from the whole of the reference.
+    step = int(np.argmax([np.linalg.norm(reference - point, axis=1).min() for point in first]))
+    joints = scenario.arm.joint_points(episodes[POLICIES[0]].q[step])
     figure = style.figure(3.6, width=9.6)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.15], height_ratios=[1.25, 1.0])
-    _space(figure.add_subplot(grid[:, 0], projection="3d", proj_type="ortho"), scenario, first, reference, step)
+    _space(figure.add_subplot(grid[:, 0], projection="3d", proj_type="ortho"), joints, first, reference, step)
     close, errors = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-    _close(close, {name: track.points for name, track in tracks.items()}, reference, step)
+    _close(close, paths, reference, step)
     times = scenario.dt * np.arange(1, scenario.steps + 1)
-    for number, track in enumerate(tracks.values()):
-        errors.plot(times, 1e3 * track.error, lw=1.1, **style.looks(number))
+    for number, episode in enumerate(episodes.values()):
+        errors.plot(times, 1e3 * episode.position_error, lw=1.1, **style.looks(number))
     errors.set_yscale("log")
     errors.set_ylim(1e-2, 1e2)
     style.dress(errors, ylabel="position error [mm]", xlabel="time [s]")
     errors.margins(x=0.01)
-    style.legend(figure, f"{SCENARIO}", close.get_lines(), ["reference", *(f"actual: {name}" for name in tracks)])
+    style.legend(figure, SCENARIO, close.get_lines(), ["reference", *(f"actual: {name}" for name in POLICIES)])
     return figure
 
 
-def _furthest(points: FloatArray, reference: FloatArray) -> int:
-    """The step at which a path is furthest from the whole of the reference."""
-    distances = [float(np.linalg.norm(reference - point, axis=1).min()) for point in points]
-    return int(np.argmax(distances))
-
-
-def _space(axes: Any, scenario: Scenario, track: Track, reference: FloatArray, step: int) -> None:
+def _space(axes: Any, joints: Any, path: FloatArray, reference: FloatArray, step: int) -> None:
     """The arm in space where it is furthest from the reference, and its path so far."""
-    joints = scenario.arm.joint_points(track.q[step])
-    links = [np.zeros(3), *(end for _, end in joints), track.points[step]]
-    axes.plot(*track.points.T, lw=4.5, alpha=0.45, **style.looks(0))
+    links = [np.zeros(3), *(end for _, end in joints), path[step]]
+    axes.plot(*path.T, lw=4.5, alpha=0.45, **style.looks(0))
     # The way there alone: it comes back the same way, and dashes would fill the gaps between dashes.
     once = slice(*sorted((int(reference[:, 2].argmin()), int(reference[:, 2].argmax()))))
     axes.plot(*reference[once].T, lw=1.3, zorder=5, **REFERENCE)
     axes.plot(*np.array(links).T, color=style.STEEL, lw=3.5, marker="o", ms=4, mfc="white", mec=style.INK)
-    axes.plot(*track.points[step], ls="", marker="s", ms=13, mfc="none", mec=style.COLOURS[1], mew=1.6)
-    axes.text(*track.points[step], "    closer:", fontsize=style.SMALL, color=style.COLOURS[1])
+    axes.plot(*path[step], ls="", marker="s", ms=13, mfc="none", mec=style.COLOURS[1], mew=1.6)
+    axes.text(*path[step], "    closer:", fontsize=style.SMALL, color=style.COLOURS[1])
     axes.view_init(elev=24, azim=-58)
     axes.set_aspect("equal")
     axes.set_box_aspect(axes._box_aspect, zoom=0.9)

@@ -9,7 +9,7 @@ import dataclasses
 import inspect
 import re
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -92,10 +92,8 @@ def problems() -> list[tuple[str, ...]]:
 
 def splits() -> list[tuple[str, ...]]:
     """One line per split."""
-    rows = [("split", "seeds")]
-    for name, seeds in ikgym.scenarios.SPLITS.items():
-        rows.append((name, f"{seeds.start:,} … {seeds.stop - 1:,}"))
-    return rows
+    seeds = {name: f"{one.start:,} … {one.stop - 1:,}" for name, one in ikgym.scenarios.SPLITS.items()}
+    return [("split", "seeds"), *seeds.items()]
 
 
 def policies() -> list[tuple[str, ...]]:
@@ -165,23 +163,8 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
-TABLES = {
-    "arms": arms,
-    "tasks": tasks,
-    "scenarios": scenarios,
-    "paths": paths,
-    "problems": problems,
-    "splits": splits,
-    "policies": policies,
-    "statuses": statuses,
-    "test_sets": test_sets,
-    "records": records,
-    "loop": loop.table,
-}
-#: Texts that are no tables.
-TEXTS: dict[str, Callable[[], str]] = {
-    "claims": claims,
-}
+_MADE = (arms, tasks, scenarios, paths, problems, splits, policies, statuses, test_sets, records)
+TABLES = {**{make.__name__: make for make in _MADE}, "loop": loop.table}
 
 
 def markdown(rows: Iterable[tuple[str, ...]]) -> str:
@@ -192,12 +175,7 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def measured(file: str, *words: str) -> str:
-    """The table of a CSV file.
-
-    Args:
-        file: The file, relative to this folder.
-        words: `columns=NAME,NAME,…` chooses columns, `NAME=VALUE` lines with that value in that column.
-    """
+    """The table of a CSV file: `columns=NAME,NAME,…` chooses columns, `NAME=VALUE` lines with that value there."""
     wanted = dict(word.split("=", 1) for word in words)
     columns = wanted.pop("columns", "").split(",")
     lines = from_csv((PAGES / file).read_text(encoding="utf-8"))
@@ -210,17 +188,13 @@ def table(words: str) -> str:
     name, *rest = shlex.split(words)
     if name.endswith(".csv"):
         return measured(name, *rest)
-    return TEXTS[name]() if name in TEXTS else markdown(TABLES[name]())
+    return claims() if name == "claims" else markdown(TABLES[name]())
 
 
 def filled(text: str) -> str:
     """A page with its tables and texts updated."""
-    return re.sub(
-        r"(<!-- table: (.+?) -->\n).*?(<!-- end -->)",
-        lambda m: f"{m[1]}{table(m[2])}\n{m[3]}",
-        text,
-        flags=re.DOTALL,
-    )
+    place = re.compile(r"(<!-- table: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
+    return place.sub(lambda m: f"{m[1]}{table(m[2])}\n{m[3]}", text)
 
 
 def main() -> None:

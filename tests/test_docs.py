@@ -18,7 +18,6 @@ from baselines.evaluate import evaluate
 from baselines.oracle import best_known
 from baselines.oracle.best_known import beaten
 from baselines.papers import PAPERS
-from docs.paper_pages import IMAGES
 from docs.tables import PAGES, filled
 from docs.terminal import manual_of
 from docs.tutorial import PAGES as TUTORIALS
@@ -75,70 +74,41 @@ def test_readme_snippets_run(capsys, tmp_path, monkeypatch):
     assert cost == pytest.approx(cells()["dls"]["total cost"], rel=1e-3)
 
 
-def test_scenarios_snippets_run(tmp_path, monkeypatch):
+#: What holds after the snippets of a page have run one after the other, in a folder of their own.
+SNIPPETS: dict[str, str] = {
+    "scenarios.md": "converged and len(greedy) == len(waypoints.positions) and driven.duration == found.duration and "
+    "np.allclose(arm.forward(q)[1], position + [0.1, 0.2, -0.1], atol=1e-9) and "
+    "ikgym.scenarios.load('mine.toml').steps == scenario.steps",
+    "bodies.md": "0.0 < distance < 0.2 and len(ikgym.scenarios.load('mine.toml').obstacles) == 2",
+    "policies.md": "[row.policy for row in rows] == ['proportional', 'proportional', 'dls'] and "
+    "adapted.total_cost < 0.01 * alone.total_cost",
+    "evaluation.md": "trajectory.q.shape == (200, 7) and (row.policy, row.preview) == ('Still', 2) and "
+    "[one.parameters['damping'] for one in rows][1] == 0.01",
+    "real-arm.md": "controller.stopped is None and controller.drives.delay == 0 and np.allclose("
+    "scenario.task.coordinates(*scenario.arm.forward(q)), reference[1000], atol=1e-5)",
+    **{f"papers/{paper}.md": "True" for paper in PAPERS},
+    "agents.md": "True",
+}
+
+
+@pytest.mark.filterwarnings("ignore:predicted does not keep")  # the machine may be busy
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=pytest.mark.slow if p == "agents.md" else ()) for p in SNIPPETS]
+)
+def test_snippets_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for part in ("_makers", "_made"):
-        monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
-    inverse, published, path, own, driven = snippets_of("scenarios.md")
-    names: dict = {}
-    exec(inverse, names)
-    assert names["converged"]
-    there = names["arm"].forward(names["q"])[1]
-    np.testing.assert_allclose(there, names["position"] + [0.1, 0.2, -0.1], atol=1e-9)
-    exec(published, names)
-    assert len(names["greedy"]) == len(names["waypoints"].positions)
-    exec(path, names)
-    exec(own, names)
-    assert names["env"].unwrapped.scenario.name == "planar4-wave"
-    assert ikgym.scenarios.load("mine.toml").steps == names["scenario"].steps
-    exec(driven, names)
-    assert names["driven"].duration == names["found"].duration
-
-
-def test_snippets_on_bodies_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names = {}
-    (snippet,) = snippets_of("bodies.md")
-    exec(snippet, names)
-    read = ikgym.scenarios.load("mine.toml")
-    assert 0.0 < names["distance"] < 0.2
-    assert [one.name for one in read.obstacles] == ["table", "wall"]
-    assert read.arm.bodies.names == names["arm"].bodies.names
-    (obstacle,) = re.findall(r"```toml\n(.*?)```", (PAGES / "bodies.md").read_text(encoding="utf-8"), re.DOTALL)
-    (tmp_path / "other.toml").write_text(f'name = "other"\nlike = "panda-circle"\n{obstacle}')
-    assert ikgym.scenarios.load("other.toml").obstacles[0].size.tolist() == [1.0, 1.0, 0.1]
-
-
-@pytest.mark.slow
-def test_snippets_on_agents_run(tmp_path, monkeypatch):
-    pytest.importorskip("stable_baselines3")
-    monkeypatch.chdir(tmp_path)
-    for snippet in snippets_of("agents.md"):
-        exec(snippet, {})
-
-
-@pytest.mark.parametrize("paper", PAPERS)
-def test_snippets_on_papers_run(paper, capsys):
-    (snippet,) = snippets_of(f"papers/{paper}.md")
-    exec(snippet, {})
-    number, status = capsys.readouterr().out.split()
-    assert np.isfinite(float(number))
-    assert status != "diverged"
+    for where, parts in ((ikgym.scenarios._registry, ("_makers", "_made")), (registry, ("_import_paths", "_classes"))):
+        for part in parts:
+            monkeypatch.setattr(where, part, dict(getattr(where, part)))
+    names = {"__name__": __name__, "np": np, "ikgym": ikgym}
+    for snippet in re.findall(r"```python\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL):
+        exec(compile(snippet, page, "exec", dont_inherit=True), names)
+    assert eval(SNIPPETS[page], names)
 
 
 def test_no_page_has_snippets_that_nobody_runs():
-    here = {"README.md", "evaluation.md", "policies.md", "real-arm.md", "scenarios.md", "agents.md", "bodies.md"}
-    run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in here), *(PAGES / "papers").glob("*.md")}
-    with_snippets = {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")}
-    assert with_snippets <= run
-
-
-@pytest.mark.parametrize("name", PAPERS)
-def test_each_figure_of_a_paper_is_on_its_page(name):
-    page = (PAGES / "papers" / f"{name}.md").read_text(encoding="utf-8")
-    shown = re.findall(r"!\[Figure (\d+): .+\]\(\.\./images/papers/(.+)\)", page)
-    assert shown == [(str(f.number), f"{name}-{f.number:02d}.png") for f in PAPERS[name].figures]
-    assert all((IMAGES / picture).is_file() for _, picture in shown)
+    run = {ROOT / "README.md", *TUTORIALS, *(PAGES / name for name in SNIPPETS)}
+    assert {page for page in PROSE if "```python" in page.read_text(encoding="utf-8")} <= run
 
 
 def test_the_policy_of_the_readme_follows_the_reference():
@@ -157,15 +127,6 @@ def test_the_policy_of_the_readme_follows_the_reference():
     assert max(errors) < 2e-3  # [m], on a path of meters
 
 
-ARM = """<robot name="arm"><link name="base_link"/><link name="upper"/><link name="lower"/><link name="tool0"/>
-<joint name="a" type="revolute"><parent link="base_link"/><child link="upper"/><axis xyz="0 0 1"/>
-<limit lower="-3" upper="3" velocity="3" effort="1"/></joint>
-<joint name="b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
-<limit lower="-3" upper="3" velocity="3" effort="1"/></joint>
-<joint name="c" type="revolute"><parent link="lower"/><child link="tool0"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
-<limit lower="-3" upper="3" velocity="3" effort="1"/></joint></robot>"""
-
-
 def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
@@ -180,16 +141,6 @@ def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch
     printed = capsys.readouterr().out
     assert "mine:Proportional" in printed
     assert "mine: 20 steps" in printed
-    # A URDF file: the arm's name goes, and the amplitudes are as many as the joints.
-    text = re.sub("arm = .*\n", "", own["mine.toml"]).replace('task = "pose"', 'task = "position"')
-    text = re.sub(r"\[(0.4|2.0), .*\]", lambda match: f"[{match[1]}, {match[1]}]", text)
-    text = re.sub(r"= \[(\S+), (\S+)\]", r"= [\1, \2, \1]", text)
-    (tmp_path / "mine-urdf.toml").write_text(
-        text + '[arm]\nurdf = "arm.urdf"\nbase = "base_link"\ntip = "tool0"\n', encoding="utf-8"
-    )
-    (tmp_path / "arm.urdf").write_text(ARM, encoding="utf-8")
-    assert main(["evaluate", "--scenarios", "mine-urdf.toml", "--policies", "dls", "--steps", "20"]) == 0
-    assert "dls" in capsys.readouterr().out
 
 
 def test_commands_of_the_documentation_exist():
@@ -283,16 +234,9 @@ def test_make_help_lists_every_target():
     assert set(re.findall(r"^(\w+):.*##", makefile, re.MULTILINE)) == set(phony)
 
 
-def planned(target: str) -> list[str]:
-    """The commands of a target of the Makefile, and of those that it calls."""
-    done = subprocess.run(
-        ["make", "--dry-run", "--always-make", target], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    return done.stdout.splitlines()
-
-
 def test_check_does_everything_in_order():
-    lines = planned("check")
+    command = ["make", "--dry-run", "--always-make", "check"]
+    lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
     wanted = ["ruff format --check", "ruff check", "mypy", "lint-imports", '-m "not slow"', "-m slow"]
     places = [next(i for i, line in enumerate(lines) if words in line) for words in wanted]
     assert places == sorted(places)
@@ -302,45 +246,3 @@ def test_check_does_everything_in_order():
 def test_the_citation_is_of_this_version():
     said = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.search(r"^version: (.*)$", said, re.MULTILINE)[1] == ikgym.__version__
-
-
-def snippets_of(page):
-    return re.findall(r"```python\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL)
-
-
-def test_evaluation_snippets_run(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names = {}
-    for snippet in snippets_of("evaluation.md"):
-        exec(compile(snippet, "evaluation.md", "exec", dont_inherit=True), names)
-    printed = capsys.readouterr().out
-    assert "('dls', 0.01, " in printed
-    assert "(200, 7)" in printed
-    assert "Still unknown 2" in printed
-    assert {file.name for file in tmp_path.iterdir()} == {"dls.csv", "dls.json", "dls.png"}
-
-
-def test_policies_snippets_run(monkeypatch):
-    monkeypatch.setattr(registry, "_import_paths", dict(registry._import_paths))
-    monkeypatch.setattr(registry, "_classes", dict(registry._classes))
-    own, adapting = snippets_of("policies.md")
-    names = {"__name__": __name__}
-    exec(compile(own, "policies.md", "exec", dont_inherit=True), names)
-    assert [(row.policy, row.parameters.get("gain")) for row in names["rows"]] == [
-        ("proportional", 1.0),
-        ("proportional", 0.5),
-        ("dls", 1.0),
-    ]
-    exec(compile(adapting, "policies.md", "exec", dont_inherit=True), names)
-    assert names["adapted"].total_cost < 0.01 * names["alone"].total_cost
-
-
-@pytest.mark.filterwarnings("ignore:predicted does not keep")  # the machine may be busy
-def test_the_loop_of_a_real_arm_runs():
-    (snippet,) = snippets_of("real-arm.md")
-    names = {}
-    exec(snippet, names)
-    assert names["controller"].stopped is None
-    assert names["controller"].drives.delay == 0
-    reached = names["scenario"].task.coordinates(*names["scenario"].arm.forward(names["q"]))
-    assert reached == pytest.approx(names["reference"][1000], abs=1e-5)

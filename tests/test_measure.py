@@ -23,12 +23,6 @@ def test_tuned_solvers_have_two_rows(name):
     assert len(here) >= 2
 
 
-def test_agents_stand_beside_their_untrained_network():
-    rows = {one["policy"]: one for one in POSE if one["scenario"] == measure.SCENARIO}
-    assert {"agent_alone", "untrained"} <= rows.keys()
-    assert int(rows["untrained"]["seeds"]) == len(measure.SEEDS)
-
-
 def parsed(policy):
     return parse_policy(policy) if registry.known(policy.partition(":")[0]) else (policy, {})
 
@@ -65,24 +59,23 @@ def test_times_are_measured_alone(tmp_path, monkeypatch):
     for name in ("RESULTS", "WORK", "RUNS"):
         monkeypatch.setattr(measure, name, tmp_path)
     (tmp_path / "some.csv").write_text(
-        HEAD + "mine,varga7-fast,1,1,3.5,3,no\nrhc,varga7-fast,1,1,2.5,,no\ndls,varga7-fast,1,1,0.5,,yes\n"
+        HEAD + "mine,varga7-fast,1,1,3.5,3,no\nbroyden,varga7-fast,1,1,2.5,,no\ndls,varga7-fast,1,1,0.5,,yes\n"
     )
-    dls, rhc, old = measure.measured("some", only_times=True)
-    assert (dls["policy"], rhc["policy"], old["policy"]) == ("dls", "rhc", "mine")
+    dls, broyden, old = measure.measured("some", only_times=True)
+    assert (dls["policy"], broyden["policy"], old["policy"]) == ("dls", "broyden", "mine")
     assert (dls["cost_ratio"], old["time_p99_us"]) == ("0.5", "3")
-    assert 0.0 < dls["time_p99_us"] < rhc["time_p99_us"]
+    assert min(dls["time_p99_us"], broyden["time_p99_us"]) > 0.0
 
 
 def test_intervals_have_costs_and_times(monkeypatch):
     monkeypatch.setattr(measure, "INTERVALS", (1, 64))
-    monkeypatch.setattr(measure, "EPISODES", 3)
+    monkeypatch.setattr(measure, "EPISODES", 2)
+    monkeypatch.setattr(measure, "BATCHED", 64)
     every, seldom = measure.intervals(only_new=False)
     assert (every["interval"], every["times_every_step"]) == (1, 1.0)
     assert seldom["times_every_step"] > 1.0
     assert all(0.0 < row["time_mean_us"] <= row["time_max_us"] for row in (every, seldom))
     assert seldom["time_batch_us"] < every["time_batch_us"]
-    times = ["time_mean_us", "time_p99_us", "time_max_us", "time_batch_us"]
-    assert measure.intervals(only_new=True)[1] == seldom | dict.fromkeys(times)
 
 
 def test_plants_are_measured_by_the_lines_of_their_table(tmp_path, monkeypatch):

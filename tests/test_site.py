@@ -32,19 +32,10 @@ def test_every_page_has_its_place():
     assert sorted(placed) == sorted(there | generated)
 
 
-def test_the_reference_has_all_public_names():
-    for name, page in (("ikgym", reference.api("ikgym")), ("baselines", reference.api("baselines"))):
-        shown = re.findall(r"^::: (\S+)$", page, re.MULTILINE)
-        assert len(shown) == len(set(shown))
-        assert {f"{name}.{public}" for public in reference.public_names(importlib.import_module(name))} <= set(shown)
-
-
 def test_the_reference_has_all_commands():
     text = reference.commands()
-    headings = re.findall(r"^## ikgym (\w+)$", text, re.MULTILINE)
-    assert headings == [*cli.COMMANDS]
-    assert all(f"usage: ikgym {word}" in text for word in headings)
-    assert "--severities" in text
+    assert re.findall(r"^## ikgym (\w+)$", text, re.MULTILINE) == [*cli.COMMANDS]
+    assert all(f"usage: ikgym {word}" in text for word in cli.COMMANDS)
     assert "## ikgym train apg" in text
 
 

@@ -19,7 +19,6 @@ from baselines.recording import Seeds
 from baselines.spec import parse_policy
 from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,24 +49,18 @@ def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> 
     """
     scenario, draw = wanted.scenario, wanted.draw
     true = stripped(scenario, draw.seed, draw.arm_seed)
-    paths = {spec: path(true, draw.seed, spec) for spec in wanted.policies}
+    paths = {spec: path_of(_made(true, spec), true, draw.seed) for spec in wanted.policies}
     given = {"arm_seed": draw.arm_seed, "cached": wanted.cached, "tick": tick, "paths": paths}
     return solve(scenario, draw.seed, wanted.how, **given)  # type: ignore[arg-type]  # the types of a dict are joined
 
 
 def find_all(
-    wanted: Sequence[Wanted],
-    workers: Workers = ALONE,
-    tick: Callable[[Wanted, float], None] = lambda one, share: None,
+    wanted: Sequence[Wanted], workers: Workers = ALONE, tick: Callable[[Wanted, float], None] = lambda one, share: None
 ) -> Iterator[tuple[Wanted, Optimum]]:
     """The cheapest paths that are found; by workers in the order in which they are done.
 
-    What workers of a cluster find is played again here, and kept on the disk of this machine as well.
-
-    Args:
-        wanted: Of which episodes.
-        workers: Who searches.
-        tick: Called now and then with an episode and the share of its work done since the last call.
+    What workers of a cluster find is played again here, and kept on the disk of this machine as well. ``tick`` is
+    called now and then with an episode and the share of its work done since the last call.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -109,11 +102,6 @@ def check_policies(wanted: Sequence[Wanted]) -> None:
     for one in {one.scenario.name: one for one in wanted}.values():
         for spec in one.policies:
             _made(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), spec)
-
-
-def path(scenario: Scenario, seed: int, spec: str) -> FloatArray:
-    """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n)."""
-    return path_of(_made(scenario, spec), scenario, seed)
 
 
 def _made(scenario: Scenario, spec: str) -> SolverPolicy:

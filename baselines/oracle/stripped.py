@@ -37,12 +37,7 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
 
 
 def ideal(scenario: Scenario, seed: int | None = None) -> Scenario:
-    """The scenario with the arm of the data sheet, ideally driven and measured.
-
-    Args:
-        scenario: The scenario.
-        seed: The reset seed whose obstacles it keeps; an ideal plant alone would have others drawn.
-    """
+    """The scenario with the arm of the data sheet, ideally driven and measured, and the obstacles of a reset seed."""
     if scenario.plant.ideal:
         return scenario
     return scenario.replace(plant=Plant(), **({} if seed is None else {"obstacles": scenario.obstacles_of(seed)}))

@@ -15,7 +15,7 @@ from baselines.papers.zhang import claims as zhang_claims
 from baselines.papers.zhang import section_4 as zhang_section_4
 from baselines.papers.zhang import section_5 as zhang_section_5
 from baselines.papers.zhang.figures import FIGURES as ZHANG_FIGURES
-from ikgym.exceptions import UnknownNameError
+from ikgym.validation import known_name
 
 _TITLES = {
     "varga": "Varga, Issa, Horváth, Tar 2021: receding horizon without Lagrange multipliers",
@@ -40,6 +40,5 @@ def get(name: str) -> Paper:
     Raises:
         UnknownNameError: There is no such paper.
     """
-    if name not in PAPERS:
-        raise UnknownNameError("paper", name, PAPERS)
+    known_name("paper", name, PAPERS)
     return PAPERS[name]

@@ -39,11 +39,7 @@ def below(values: Mapping[str, float], limit: float) -> dict[str, bool]:
 
 
 def falls(pairs: Mapping[str, tuple[float, float]]) -> dict[str, bool]:
-    """Whether a value falls, in the conditions in which it changes by a tenth or more.
-
-    Args:
-        pairs: The value before and after, by condition.
-    """
+    """Whether a value falls, from before to after, in the conditions in which it changes by a tenth or more."""
     return {name: after < before for name, (before, after) in pairs.items() if differ(before, after)}
 
 

@@ -14,15 +14,7 @@ from ikgym.validation import FloatArray
 
 
 class Curve(NamedTuple):
-    """A line.
-
-    Attributes:
-        name: Its legend entry; curves of the same name in a figure share colour and entry.
-        x: Abscissae. Shape (k,).
-        y: Ordinates. Shape (k,).
-        dashed: Whether the line is dashed, as nominal curves are.
-        dots: Whether there are single points instead of a line.
-    """
+    """A line of k points, or the points alone; those of the same name in a figure share colour and legend entry."""
 
     name: str
     x: FloatArray
@@ -32,15 +24,7 @@ class Curve(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Curves over one pair of axes.
-
-    Attributes:
-        ylabel: Label of the ordinate, with the unit.
-        curves: The curves.
-        xlabel: Label of the abscissa, with the unit; always shown in the lowest row.
-        log: Whether the ordinate is logarithmic.
-        title: The title of the panel.
-    """
+    """Curves over one pair of axes; labels have units, and that of the abscissa always stands in the lowest row."""
 
     ylabel: str
     curves: Sequence[Curve]
@@ -57,16 +41,7 @@ def compared(
     names: tuple[str, str] = ("actual", "nominal"),
     xlabel: str = "time [s]",
 ) -> list[Panel]:
-    """A panel for each coordinate, with its actual and its nominal course.
-
-    Args:
-        labels: Labels of the ordinates, with the units.
-        x: Abscissae. Shape (k,).
-        actual: Actual coordinates. Shape (k, m).
-        nominal: Nominal ones. Shape (k, m).
-        names: Names of both in the legend.
-        xlabel: Label of the abscissa.
-    """
+    """A panel for each of m coordinates, actual and nominal ones of shape (k, m) over abscissae of shape (k,)."""
     return [
         Panel(label, [Curve(names[0], x, actual[:, i]), Curve(names[1], x, nominal[:, i], dashed=True)], xlabel)
         for i, label in enumerate(labels)
@@ -74,14 +49,7 @@ def compared(
 
 
 def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 2.1) -> Figure:
-    """Panels in rows, with one legend for all.
-
-    Args:
-        title: The title of the figure.
-        panels: From left to right, from top to bottom.
-        columns: Panels in a row.
-        height: Height of a row in [in].
-    """
+    """Panels in rows of so many columns and a height in [in], with one legend for all."""
     rows = -(-len(panels) // columns)
     drawn = style.figure(0.8 + height * rows)
     grid = drawn.add_gridspec(rows, columns)

@@ -6,7 +6,7 @@ import dataclasses
 import pathlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Literal, NamedTuple
 
 from matplotlib.figure import Figure
@@ -29,12 +29,10 @@ class Finding(NamedTuple):
         holds: Whether the claim holds; by reading or condition if the text allows several; None if nothing in the text
             decides.
         figures: The figures that decide.
-        more: Further figures, for the file of numbers alone.
     """
 
     holds: bool | Mapping[str, bool] | None
     figures: Figures
-    more: Figures = MappingProxyType({})
 
     @property
     def verdict(self) -> Verdict:
@@ -63,12 +61,7 @@ def _number(value: float) -> str:
 
 
 def scaled(values: Figures, unit: str) -> dict[str, float | Sequence[float]]:
-    """Figures in a unit that is convenient to read.
-
-    Args:
-        values: Figures in SI units or as shares, by name without the unit.
-        unit: For example ``"mm"`` or ``"%"``.
-    """
+    """Figures in a unit such as ``"mm"`` or ``"%"``, from SI units or shares by name without the unit."""
     scale = _SCALES.get(unit, 1.0)
     return {
         f"{name} [{unit}]": [scale * v for v in value] if isinstance(value, Sequence) else scale * value
@@ -130,11 +123,7 @@ class Paper:
 
 
 def claims_of(*modules: ModuleType) -> tuple[Claim, ...]:
-    """The claims of ``claims.toml`` beside some modules, each tested by the function of the same name in one of them.
-
-    Args:
-        *modules: The modules, such as :mod:`baselines.papers.varga.claims`.
-    """
+    """The claims of ``claims.toml`` beside some modules, each tested by the function of the same name."""
     text = pathlib.Path(str(modules[0].__file__)).with_name("claims.toml").read_text(encoding="utf-8")
     tests = {name: value for module in modules for name, value in vars(module).items()}
     return tuple(Claim(name, test=tests[name], **record) for name, record in tomllib.loads(text).items())

@@ -34,16 +34,7 @@ class Runs:
         return whole if self.steps is None else whole.replace(steps=min(self.steps, whole.steps))
 
     def play(self, scenario: str | Scenario, policy: str, /, **parameters: Any) -> Episode:
-        """The episode of a policy in a fixed scenario, from seed 0.
-
-        Args:
-            scenario: The scenario, or its name.
-            policy: The policy's name.
-            **parameters: The policy's parameters.
-
-        Returns:
-            The recorded episode; the same object at every call.
-        """
+        """The episode of a policy in a fixed scenario, from seed 0; the same object at every call."""
         what = self.scenario(scenario)
         key = episode_hash(what, 0), policy, canonical(jsonable(parameters))
         if key not in self._episodes:

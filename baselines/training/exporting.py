@@ -30,10 +30,6 @@ _COMPARED, _NEAR = 64, 1e-4
 def runtime(modules: Sequence[nn.Module], squash: str) -> Network:
     """The network of the compiled runtime with the layers of a PyTorch network.
 
-    Args:
-        modules: Linear layers with activations between them.
-        squash: See :class:`Network`.
-
     Raises:
         TypeError: There is another module, or activations of several kinds.
     """
@@ -46,10 +42,7 @@ def runtime(modules: Sequence[nn.Module], squash: str) -> Network:
 
 
 def export(
-    model: BaseAlgorithm,
-    envs: LearningVecEnv,
-    file: str | pathlib.Path,
-    training: Mapping[str, Any] | None = None,
+    model: BaseAlgorithm, envs: LearningVecEnv, file: str | pathlib.Path, training: Mapping[str, Any] | None = None
 ) -> str:
     """Writes a model as an agent that needs no learning library: ``ikgym evaluate --policies agent:FILE`` plays it.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pathlib
 
 from baselines.training.config import APG, PPO, SAC, TD3, RecurrentPPO, Rewards
-from ikgym.exceptions import UnknownNameError
 from ikgym.files import read_user_toml
+from ikgym.validation import known_name
 
 #: Configurations by the names of their methods; the docstring of each describes the method on the command line.
 BY_REWARDS: dict[str, type[Rewards]] = {kind.method: kind for kind in (PPO, SAC, TD3, RecurrentPPO)}
@@ -34,7 +34,5 @@ def configure(preset: str | None) -> APG:
         return APG()
     if preset.endswith(".toml"):
         return APG.from_json(read_user_toml(preset))
-    tables = read_user_toml(PRESETS)
-    if preset not in tables:
-        raise UnknownNameError("preset", preset, tables)
+    known_name("preset", preset, tables := read_user_toml(PRESETS))
     return APG.from_json(tables[preset])

@@ -156,11 +156,11 @@ class _Run:
         score = None
         if done % config.evaluate_every == 0 or done == config.segments:
             score = validate(trainer.agent(), self._scenario, config.validation_episodes)
-            row["validation"] = score.to_json()
+            row["validation"] = vars(score)
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
                 weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}
-                self._at.best = {"segment": done, "score": score.to_json(), "policy": weights}
-        for name, value in [*row.items(), *(score.to_json() if score else {}).items()]:
+                self._at.best = {"segment": done, "score": vars(score), "policy": weights}
+        for name, value in [*row.items(), *(vars(score) if score else {}).items()]:
             if isinstance(value, float):
                 board.add_scalar(name if "/" in name else f"validation/{name}", value, trainer.steps)
         clock, core = time.monotonic(), time.process_time()

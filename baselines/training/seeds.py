@@ -88,21 +88,11 @@ class Seed:
 def train_seeds(
     config: APG, options: RunOptions, seeds: Sequence[int], *, workers: Workers = ALONE, command: str = ""
 ) -> list[SeedResult]:
-    """Trains one agent a seed.
+    """Trains one agent a seed; the results are in the order of the seeds.
 
-    One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others.
-    On a cluster, all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
+    One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others. On
+    a cluster, all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
     checkpoint.
-
-    Args:
-        config: The options.
-        options: The options of the runs.
-        seeds: One run each.
-        workers: Processes of this machine or of a cluster.
-        command: The command that started the runs, for `run.json`.
-
-    Returns:
-        The results, in the order of the seeds.
 
     Raises:
         ClusterError: There is no cluster.

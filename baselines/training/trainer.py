@@ -204,12 +204,7 @@ def _load_weights(policy: nn.Sequential, config: APG) -> None:
 
 
 def new_actor(sizes: Sequence[int], activation: Activation) -> nn.Sequential:
-    """Linear layers with activations between them, whose first outputs are almost 0.
-
-    Args:
-        sizes: Numbers of inputs, of neurons of the hidden layers, and of outputs.
-        activation: Activation of the hidden layers.
-    """
+    """Linear layers with activations between them, whose first outputs are almost 0."""
     layers = [nn.Linear(inputs, outputs) for inputs, outputs in itertools.pairwise(sizes)]
     with torch.no_grad():
         layers[-1].weight.mul_(QUIET)

@@ -13,23 +13,21 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines import registry
 from baselines.agents.files import AgentFile
 from baselines.agents.policy import Agent
-from baselines.episodes import play, rollouts
+from baselines.episodes import rollouts
 from baselines.evaluation.metrics import lost
 from baselines.files import write
 from baselines.fingerprints import fingerprint
 from baselines.policy import Problem
+from baselines.policy.protocol import Policy
 from baselines.recording import add_up
 from baselines.spec import parse_policy
 from baselines.statistics import geometric_mean
 from ikgym import scenarios, tasks
-from ikgym.kernels.outcome import observation
-from ikgym.kernels.simulation import Outcome
-from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: The file of the reference costs, the reference policy, and the scenario, tasks and number of episodes.
@@ -63,10 +61,6 @@ class Score:
     position_error_max_mm: float
     orientation_error_max_mrad: float | None = None
 
-    def to_json(self) -> dict[str, Any]:
-        """The fields by name."""
-        return dataclasses.asdict(self)
-
 
 def validation_seeds(scenario: Scenario, episodes: int) -> tuple[int, ...]:
     """The first seeds of the validation split; one where the scenario is deterministic."""
@@ -85,45 +79,25 @@ def bound(agent: AgentFile, scenario: Scenario) -> Agent:
 
 def validate(agent: AgentFile, scenario: Scenario, episodes: int) -> Score:
     """The score of an agent, see :func:`score`."""
-    policy = bound(agent, scenario)
-    return score(policy, scenario, episodes, policy.preview)
+    return score(bound(agent, scenario), scenario, episodes)
 
 
-def score(policy: Any, scenario: Scenario, episodes: int, preview: Preview) -> Score:
-    """Plays episodes of the validation split with a policy, all of them side by side.
-
-    Args:
-        policy: Any object with the `predict` of Stable-Baselines3 for observations of the environment.
-        scenario: The scenario.
-        episodes: Number of episodes; a deterministic scenario has one.
-        preview: Steps ahead that the policy is shown.
-    """
-    seeds, state = validation_seeds(scenario, episodes), None
-    rows, starting = len(seeds), np.ones(len(seeds), dtype=np.bool_)
-
-    def act(out: Outcome) -> npt.NDArray[Any]:
-        nonlocal state
-        action, state = policy.predict(observation(out), state, starting, deterministic=True)
-        starting[:] = False
-        actions: npt.NDArray[Any] = action
-        return actions
-
-    costs, errors, angles = np.empty((rows, scenario.steps)), np.zeros(rows), np.zeros(rows)
-    for k, out in enumerate(play(scenario, seeds, act, preview=preview)):
-        costs[:, k] = out.cost
-        errors = np.maximum(errors, out.position_error)
-        if scenario.task.has_orientation:
-            angles = np.maximum(angles, out.orientation_error)
-    total, reference = add_up(costs), reference_costs(fingerprint(scenario), seeds)
+def score(policy: Policy, scenario: Scenario, episodes: int) -> Score:
+    """Plays episodes of the validation split with a policy; a deterministic scenario has one."""
+    seeds = validation_seeds(scenario, episodes)
+    played = rollouts(scenario, policy, seeds)
+    total, reference = np.array([add_up(one.cost) for one in played]), reference_costs(fingerprint(scenario), seeds)
     ratios = total if reference is None else total / reference
+    errors = [float(one.position_error.max()) for one in played]
+    angles = [float(np.nan_to_num(one.orientation_error).max()) for one in played]
     return Score(
-        episodes=rows,
+        episodes=len(seeds),
         cost=geometric_mean(total.tolist()),
         cost_ratio=None if reference is None else geometric_mean(ratios.tolist()),
         worst=float(ratios.max()),
-        lost=float(np.mean([lost(distance, angle) for distance, angle in zip(errors, angles, strict=True)])),
-        position_error_max_mm=1e3 * float(errors.mean()),
-        orientation_error_max_mrad=1e3 * float(angles.mean()) if scenario.task.has_orientation else None,
+        lost=float(np.mean([lost(*both) for both in zip(errors, angles, strict=True)])),
+        position_error_max_mm=1e3 * float(np.mean(errors)),
+        orientation_error_max_mrad=1e3 * float(np.mean(angles)) if scenario.task.has_orientation else None,
     )
 
 
@@ -146,14 +120,13 @@ def record_of(scenario: Scenario, seeds: Sequence[int]) -> dict[str, Any]:
     """The costs of the reference policy on some episodes, as the file has them."""
     name, parameters = parse_policy(POLICY)
     episodes = rollouts(scenario, registry.make(name, scenario, **parameters), seeds)
-    costs = [float(np.sum(e.cost)) for e in episodes]
     return {
         "scenario": scenario.name,
         "task": scenario.task.name,
         "fingerprint": fingerprint(scenario),
         "policy": POLICY,
         "seeds": list(seeds),
-        "costs": [float(f"{cost:.{DIGITS}g}") for cost in costs],
+        "costs": [float(f"{one.cost.sum():.{DIGITS}g}") for one in episodes],
     }
 
 

@@ -124,12 +124,7 @@ class CasadiHorizon:
         return casadi.Function("residual", [q, nominal], [r])
 
     def solve(self, horizon: Horizon, start: FloatArray | None = None) -> Plan:
-        """The optimum from one state.
-
-        Args:
-            horizon: The state, of K knots.
-            start: Where to begin: joint coordinates at the knots; at rest if left out. Shape (K, n).
-        """
+        """The optimum from one state, begun at joint coordinates (K, n) at the knots, or at rest."""
         problem = self.problem
         rest = np.tile(horizon.q, (self.knots, 1))
         y = ((rest if start is None else start) - horizon.q) / problem.dt

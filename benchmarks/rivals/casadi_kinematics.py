@@ -26,14 +26,7 @@ def forward(arm: Arm, q: Any) -> tuple[Any, Any]:
 
 
 def error(task: str, nominal: Any, rotation: Any, position: Any) -> Any:
-    """The error of a pose with respect to nominal task coordinates.
-
-    Args:
-        task: The name of the task coordinates.
-        nominal: Nominal coordinates. Shape (m,).
-        rotation: Orientation. Shape (3, 3).
-        position: Position in [m]. Shape (3,).
-    """
+    """The error of a pose, rotation (3, 3) and position (3,) in [m], with respect to nominal task coordinates (m,)."""
     if task == "position":
         return nominal - position
     if task == "skew":

@@ -76,13 +76,7 @@ class Plan:
 
 
 def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
-    """The cost of a plan.
-
-    Args:
-        problem: Arm, task, cost and Δt.
-        horizon: Start, nominal coordinates, lengths and weights.
-        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
-    """
+    """The cost of a plan, joint coordinates (K, n) at the knots in [rad] or [m]."""
     cost, h = problem.cost, horizon.lengths
     qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h[:, None] * problem.dt)
     errors = [
@@ -95,17 +89,11 @@ def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
 
 
 def beyond_limits(problem: Problem, horizon: Horizon, q: FloatArray, braking: bool = False) -> dict[str, float]:
-    """The largest violation of the limits of the model by a plan; below 0 within the limits.
+    """The largest violation of the limits of the model by a plan (K, n); below 0 within the limits.
 
-    Args:
-        problem: Arm, task, cost and Δt.
-        horizon: Start, lengths and velocities before.
-        q: Joint coordinates at the knots, in [rad] or [m]. Shape (K, n).
-        braking: Whether the arm has to be able to stop within its joint limits behind the last knot.
-
-    Returns:
-        Of positions in [rad] or [m], of velocities in [rad/s] or [m/s], and of accelerations, of which a change of
-        velocity between blocks of a and b steps takes (a + b) / 2, and the first one a step, in [rad/s²] or [m/s²].
+    Of positions, velocities and accelerations. A change of velocity between blocks of a and b steps takes (a + b) / 2
+    steps, and the first one a step. With ``braking`` the arm has to be able to stop within its joint limits behind the
+    last knot.
     """
     arm, h = problem.model, horizon.lengths[:, None]
     qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h * problem.dt)

@@ -11,33 +11,15 @@ from baselines import cli
 from baselines.training.methods import METHODS
 from docs.terminal import manual_of
 
-#: Content of each page of the reference, by module: its public names, or those that are listed.
-PAGES: dict[str, dict[str, tuple[str, ...]]] = {
-    "ikgym": {
-        "ikgym": (),
-        "ikgym.arms": (),
-        "ikgym.obstacles": (),
-        "ikgym.tasks": (),
-        "ikgym.trajectories": (),
-        "ikgym.trajectories.paths": (),
-        "ikgym.scenarios": (),
-        "ikgym.problems": (),
-        "ikgym.kernels.rotations": (),
-        "ikgym.exceptions": (),
-        "ikgym.sb3": (),
-    },
-    "baselines": {
-        "baselines": (),
-        "baselines.evaluate": ("evaluate",),
-        "baselines.evaluation.tracking": ("Tracking",),
-        "baselines.evaluation.metrics": ("Row",),
-        "baselines.policy": (),
-        "baselines.wrapper": (),
-        "baselines.controller": (),
-        "baselines.oracle": (),
-        "baselines.papers": (),
-        "baselines.papers.paper": ("Paper", "PaperFigure", "Claim", "Finding"),
-    },
+_PARTS = "arms obstacles tasks trajectories trajectories.paths scenarios problems kernels.rotations exceptions sb3"
+#: Modules on each page of the reference; those with names show these alone.
+PAGES = {
+    "ikgym": ("ikgym", *(f"ikgym.{part}" for part in _PARTS.split())),
+    "baselines": (
+        *("baselines", "baselines.evaluate:evaluate", "baselines.evaluation.tracking:Tracking"),
+        *("baselines.evaluation.metrics:Row", "baselines.policy", "baselines.wrapper", "baselines.controller"),
+        *("baselines.oracle", "baselines.papers", "baselines.papers.paper:Paper,PaperFigure,Claim,Finding"),
+    ),
 }
 
 
@@ -62,11 +44,12 @@ def _described(thing: Any) -> bool:
 def api(page: str) -> str:
     """A page of the API, for mkdocstrings to fill."""
     parts, seen = [f"# {page}\n"], set[Any]()
-    for name, chosen in PAGES[page].items():
+    for entry in PAGES[page]:
+        name, _, chosen = entry.partition(":")
         module = importlib.import_module(name)
         said = (inspect.getdoc(module) or "").split("\n\n")[0]
         parts.append(f"## {name} {{: #module-{name} }}\n\n{said}\n" if name != page else f"{said}\n")
-        for public in chosen or public_names(module):
+        for public in chosen.split(",") if chosen else public_names(module):
             if getattr(module, public) not in seen:
                 seen.add(getattr(module, public))
                 parts.append(f"::: {name}.{public}\n    options: {{heading_level: 3}}\n")

@@ -40,10 +40,5 @@ def file(config: MkDocsConfig) -> File | None:
 
 
 def placed(markdown: str, *, there: bool) -> str:
-    """A page that shows the report where it is to be.
-
-    Args:
-        markdown: The page.
-        there: Whether there is a report.
-    """
+    """A page that shows the report where it is to be, or says that it is not there."""
     return _PLACE.sub(lambda found: f"{found[0]}\n\n{_SHOWN if there else _ABSENT}", markdown)

@@ -23,12 +23,7 @@ class Roles(griffe.Extension):
         self._paths: dict[str, list[str]] = defaultdict(list)  # of all that the packages have, by its last name
 
     def on_package(self, *, pkg: griffe.Module, loader: griffe.GriffeLoader, **_: Any) -> None:
-        """Rewrites those of all its modules.
-
-        Args:
-            pkg: The package.
-            loader: The loader.
-        """
+        """Rewrites those of all its modules."""
         self._collect(pkg)
         self._rewrite(pkg)
 

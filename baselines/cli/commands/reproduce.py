@@ -21,6 +21,7 @@ from baselines.cli import shell
 from baselines.cli.parsing import parse
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
+from baselines.evaluation.records import to_csv
 from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
@@ -78,7 +79,7 @@ def reproduce(
                 _write_numbers(folder / paper.name / "numbers.json", findings[paper.name])
         if folder is not None and numbers is None:
             results = ledger.rows(findings)
-            write(folder / "claims.csv", ledger.to_csv(results).encode())
+            write(folder / "claims.csv", to_csv(results).encode())
             write(folder / "papers.md", ledger.markdown(chosen, results).encode())
     return findings
 
@@ -96,7 +97,7 @@ def _draw(paper: Paper, runs: Runs, numbers: set[int] | None, folder: pathlib.Pa
 
 def _write_numbers(file: pathlib.Path, findings: Mapping[str, Finding]) -> None:
     claims = {
-        name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures, "more": found.more}
+        name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures}
         for name, found in findings.items()
     }
     content = jsonable({"machine": describe(), "claims": claims})

@@ -19,7 +19,6 @@ from baselines.papers.faitli.episodes import (
     singular_places,
     singular_values,
     solved,
-    speeds,
     times,
     yank,
 )
@@ -28,7 +27,6 @@ from baselines.papers.runs import Runs
 from baselines.papers.varga.episodes import FAST, SLOW, nominal_angles
 from baselines.recording import Episode
 from baselines.registry import make
-from baselines.status import Status
 from ikgym.validation import FloatArray
 
 
@@ -37,24 +35,20 @@ def _largest_error(episode: Episode) -> float:
 
 
 def accurate_tracking(runs: Runs) -> Finding:
-    """Largest error as a share of the path's extent."""
-    errors = {short(name): _largest_error(solved(runs, name)) for name in TRAJECTORIES}
-    shares = {short(name): errors[short(name)] / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES}
-    return Finding(max(shares.values()) < SAME, scaled(shares, "%"), scaled(errors, "mm"))
+    shares = {
+        short(name): _largest_error(solved(runs, name)) / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES
+    }
+    return Finding(max(shares.values()) < SAME, scaled(shares, "%"))
 
 
 def accurate_in_singularities(runs: Runs) -> Finding:
-    """Largest error in the quarter of the path with the smallest singular values, as a share of the extent."""
     shares: dict[str, float] = {}
-    more: dict[str, float] = {}
     for name in (STRETCHED, SHOULDER):
         scenario, error = runs.scenario(name), solved(runs, name).position_error
         smallest = singular_values(jacobians(scenario, nominal_joints(scenario)))[:, -1]
         near = smallest < np.quantile(smallest, 0.25)
         shares[short(name)] = float(error[near].max()) / extent(runs.scenario(name).nominal())
-        more |= {f"{short(name)}, RMS near [m]": rms(error[near]), f"{short(name)}, elsewhere [m]": rms(error[~near])}
-    more |= {f"largest, {n} iterations [m]": _largest_error(solved(runs, iterations=n)) for n in (1, 10, 100)}
-    return Finding(max(shares.values()) < SAME, scaled(shares, "%"), more)
+    return Finding(max(shares.values()) < SAME, scaled(shares, "%"))
 
 
 def _separation(runs: Runs, name: str, episode: Episode) -> FloatArray:
@@ -64,14 +58,12 @@ def _separation(runs: Runs, name: str, episode: Episode) -> FloatArray:
 
 
 def other_joint_coordinates(runs: Runs) -> Finding:
-    """Largest distance of the joint paths."""
     apart = float(_separation(runs, STRETCHED, solved(runs)).max())
     nominal = nominal_joints(runs.scenario(STRETCHED))
     return Finding(apart > 0.1 * np.ptp(nominal, axis=0).max(), {"[rad]": apart})
 
 
 def separation_at_singularities(runs: Runs) -> Finding:
-    """Time between a singular point and the separation of the joint paths."""
     scenario = runs.scenario(STRETCHED)
     time, nominal = times(scenario), nominal_joints(scenario)
     regular = float(_separation(runs, REGULAR, solved(runs, REGULAR)).max())
@@ -84,7 +76,6 @@ def separation_at_singularities(runs: Runs) -> Finding:
 
 
 def zero_eigenvalues(runs: Runs) -> Finding:
-    """Singular points passed: sign changes of det J along the calculated joint path, then along the nominal one."""
     counts: dict[str, list[float]] = {}
     for name in TRAJECTORIES:
         scenario = runs.scenario(name)
@@ -94,57 +85,46 @@ def zero_eigenvalues(runs: Runs) -> Finding:
 
 
 def real_part_zero_is_singular(runs: Runs) -> Finding:
-    """Zeros of a real part at which J is regular: a conjugate pair of eigenvalues crosses the imaginary axis there."""
     regular: dict[str, float] = {}
-    more: dict[str, float] = {}
     for name in TRAJECTORIES:
         jacobian = jacobians(runs.scenario(name), solved(runs, name).q)
-        zeros = real_zeros(jacobian)
-        smallest = singular_values(jacobian[zeros])[:, -1]
+        smallest = singular_values(jacobian[real_zeros(jacobian)])[:, -1]
         regular[short(name)] = int((smallest > 0.01).sum())
-        more[f"{short(name)}, zeros"] = len(zeros)
-        more[f"{short(name)}, smallest singular value [m]"] = float(smallest.min(initial=np.inf))
-    return Finding(max(regular.values()) == 0, regular, more)
+    return Finding(max(regular.values()) == 0, regular)
 
 
 def end_point_of_link_2(runs: Runs) -> Finding:
-    """Largest distance of the joint paths, without and with the end point: A = -1, and A sure to contract."""
     figures = {}
     sure = make("fixed_point_extended", runs.scenario(STRETCHED)).parameters["a"]
     for name in TRAJECTORIES:
         episodes = [solved(runs, name), *(runs.play(name, "fixed_point_extended", a=a) for a in (-1.0, sure))]
         figures[short(name)] = [float(_separation(runs, name, episode).max()) for episode in episodes]
     holds = all(max(extended) < plain for plain, *extended in figures.values())
-    return Finding(holds, scaled(figures, "mrad"), {"A sure to contract": sure})
+    return Finding(holds, scaled(figures, "mrad"))
 
 
 def d_is_a_parameter(runs: Runs) -> Finding:
-    """Joint paths with other values of D, which differ by rounding."""
     paths = [solved(runs, d=d).q for d in (0.3, 0.0, -2.0, 5.0)]
     apart = max(float(np.abs(q - paths[0]).max()) for q in paths[1:])
     return Finding(apart > 1e-4, {"[rad]": apart})
 
 
 def a_decides_convergence(runs: Runs) -> Finding:
-    """Largest error with values of A within and beyond the bound."""
     scenario = runs.scenario(REGULAR)
     bound = 4.0 / float(singular_values(jacobians(scenario, nominal_joints(scenario))).max() ** 2)
     errors = {a: _largest_error(solved(runs, REGULAR, a=a)) for a in (0.1, -0.1, -1.0, -2.0, -3.0)}
     good = {a: e for a, e in errors.items() if -bound < a < 0.0}
     bad = {a: e for a, e in errors.items() if a not in good}
     figures = scaled({"": list(errors.values())}, "mm")
-    return Finding(min(bad.values()) > max(good.values()), figures, {"bound": bound})
+    return Finding(min(bad.values()) > max(good.values()), figures)
 
 
 def transpose_helps_convergence(runs: Runs) -> Finding:
-    """Largest error with Jᵀ, and without it with the best A."""
-    figures, more = {}, {}
+    figures = {}
     for name in TRAJECTORIES:
         without = [solved(runs, name, transformation="none", a=a) for a in (-1.0, -0.1, 0.1, 1.0)]
-        best = min(without, key=_largest_error)
-        figures[short(name)] = _largest_error(solved(runs, name)), _largest_error(best)
-        more[f"{short(name)}, share diverged without"] = float((best.status == Status.DIVERGED).mean())
-    return Finding(all(a < b for a, b in figures.values()), scaled(figures, "mm"), more)
+        figures[short(name)] = _largest_error(solved(runs, name)), min(map(_largest_error, without))
+    return Finding(all(a < b for a, b in figures.values()), scaled(figures, "mm"))
 
 
 def not_square(runs: Runs) -> Finding:
@@ -154,7 +134,6 @@ def not_square(runs: Runs) -> Finding:
     """
     holds: dict[str, bool] = {}
     figures: dict[str, list[float]] = {}
-    more: dict[str, float] = {}
     for path, iterations in itertools.product((SLOW, FAST), (10, 50)):
         episode, where = solved(runs, path, length=1.0, iterations=iterations), f"{path}, {iterations}"
         position, angle = _largest_error(episode), float(episode.orientation_error.max())
@@ -164,12 +143,10 @@ def not_square(runs: Runs) -> Finding:
         numbers = {"[mm]": 1e3 * position, "[rad]": angle}
         numbers |= {"of the extent [%]": 100.0 * of_extent, "of the turn [%]": 100.0 * of_turn}
         figures = {name: [*figures.get(name, []), value] for name, value in numbers.items()}
-        more[f"{where}, share diverged"] = float((episode.status == Status.DIVERGED).mean())
-    return Finding(holds, figures, more)
+    return Finding(holds, figures)
 
 
 def several_iterations(runs: Runs) -> Finding:
-    """Error with 1, 10 and 100 iterations a grid point."""
     figures = {
         short(name): [rms(solved(runs, name, iterations=n).position_error) for n in (1, 10, 100)]
         for name in TRAJECTORIES
@@ -178,26 +155,20 @@ def several_iterations(runs: Runs) -> Finding:
 
 
 def no_inversion(runs: Runs) -> Finding:
-    """Counted by hand in eq. 1: each iteration takes one Jacobian and multiplies by its transpose."""
     jacobians_of_a_step = int(make("fixed_point", runs.scenario(STRETCHED)).parameters["iterations"])
     factorisations = 0
     return Finding(factorisations == 0, {"factorisations": factorisations, "Jacobians a step": jacobians_of_a_step})
 
 
 def no_yanks(runs: Runs) -> Finding:
-    """Peak joint velocity over the median of the fastest joint's, where inversion yanks."""
-    multiples, more = {}, {}
+    multiples = {}
     for scenario in singular_places(runs):
         inversion, method = runs.play(scenario, "moore_penrose"), solved(runs, scenario)
         multiples[short(scenario.name)] = yank(inversion), yank(method)
-        for label, episode in (("inversion", inversion), ("method", method)):
-            more[f"{short(scenario.name)}, {label} [rad/s]"] = float(speeds(episode).max())
-        more[f"{short(scenario.name)}, method [m]"] = _largest_error(method)
     yanked = [method for inversion, method in multiples.values() if inversion > YANK]
-    return Finding(bool(yanked) and max(yanked) <= YANK, multiples, more)
+    return Finding(bool(yanked) and max(yanked) <= YANK, multiples)
 
 
 def easy_to_set(runs: Runs) -> Finding:
-    """A judgement."""
     del runs
     return Finding(None, {})

@@ -32,13 +32,9 @@ def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> E
 
 
 def past_shoulder(runs: Runs, distance: float) -> Scenario:
-    """A straight line at 0.9 m/s past the shoulder axis, with a velocity limit above the needs of all solvers.
+    """A straight line at 0.9 m/s past the shoulder axis at a distance in [m], with a velocity limit above all needs.
 
     The tool is at rest at both ends, and the elbow stays bent.
-
-    Args:
-        runs: Gives the scenario that is changed.
-        distance: Of the line from the axis, in [m].
     """
     scenario = runs.scenario(REGULAR)
     radius = scenario.arm.forward(np.array([0.0, -1.3, 0.9]))[1][0]

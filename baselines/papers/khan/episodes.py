@@ -33,16 +33,10 @@ BLOCKED: Variant = {"joint_weights": (1.0,) * 6 + (0.01,) * 2}
 
 
 class Points(NamedTuple):
-    """An episode at its grid points, each after the point's last inner step.
+    """An episode at its k grid points, each after the point's last inner step.
 
-    Attributes:
-        time: s in [s]. Shape (k,).
-        nominal: Nominal task coordinates. Shape (k, 12).
-        pose: Actual ones. Shape (k, 12).
-        position_error: In [m]. Shape (k,).
-        orientation_error: In [rad]. Shape (k,).
-        q: Joint coordinates in [rad]. Shape (k, 8).
-        diagnostics: Angles of both rotations in [rad], by name; each of shape (k,).
+    Times in [s], task coordinates (k, 12), errors in [m] and [rad], joint coordinates (k, 8) in [rad], and angles of
+    both rotations in [rad] by name.
     """
 
     time: FloatArray
@@ -75,14 +69,7 @@ def at_points(runs: Runs, name: str | Scenario, policy: str = METHOD, **paramete
 
 
 class Errors(NamedTuple):
-    """Errors at the grid points after 1 s.
-
-    Attributes:
-        position: Root mean square in [m].
-        angle: Root mean square of the orientation error in [rad].
-        largest_position: The largest one in [m].
-        largest_angle: The largest one in [rad].
-    """
+    """Errors at the grid points after 1 s, in [m] and [rad]: root mean squares, and the largest."""
 
     position: float
     angle: float

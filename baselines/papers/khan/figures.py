@@ -88,15 +88,7 @@ def _figure(
     name: str,
     weights: Variant | None = None,
 ) -> PaperFigure:
-    """A figure of one of the runs.
-
-    Args:
-        number: Its number in the paper.
-        subject: Its subject.
-        draw: Draws it from its title, the points with and without weights, and the nominal joint path.
-        name: The scenario.
-        weights: ℱ or 𝒲, unless they are the identity.
-    """
+    """A figure of one of the runs, drawn from its title, points with and without ℱ or 𝒲, and the nominal joint path."""
     given = weights or {}
     path = "joint 1" if name == Q1 else "joints 7 and 8"
     title = f"{subject}, nominal path by {path}" + "".join(text for key, text in WEIGHTED.items() if key in given)

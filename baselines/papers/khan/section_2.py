@@ -8,15 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.papers.comparisons import SAME, YANK, extent, rms
-from baselines.papers.faitli.episodes import (
-    REGULAR,
-    STRETCHED,
-    TRAJECTORIES,
-    jacobians,
-    nominal_joints,
-    short,
-    singular_places,
-)
+from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, nominal_joints, short, singular_places
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.status import Status
@@ -31,28 +23,17 @@ VALUES = (-1.0, -0.1, -0.02, 0.1, 1.0)
 
 
 class Best(NamedTuple):
-    """The best of several runs.
+    """The largest error at the nominal points of the best of several runs in [m].
 
-    Attributes:
-        error: The largest error at the nominal points, in [m].
-        a: A.
-        success: Whether no step diverged, and the error is below 1 % of the path's extent.
+    It is a success if no step diverged and the error is below 1 % of the path's extent.
     """
 
     error: float
-    a: float
     success: bool
 
 
 def best(runs: Runs, scenario: Scenario, transformation: str, values: Sequence[float] = VALUES) -> Best:
-    """The best run of `fixed_point` over A: with one iteration a step where points are held, else with ten.
-
-    Args:
-        runs: Plays the episodes.
-        scenario: The scenario.
-        transformation: That of `fixed_point`.
-        values: Values of A.
-    """
+    """The best run of `fixed_point` over A: with one iteration a step where points are held, else with ten."""
     counted = scenario.counted()[1:]
     given: dict[str, Any] = {"transformation": transformation, "iterations": 10 if counted.all() else 1}
     if scenario.arm.joints == 2:
@@ -63,7 +44,7 @@ def best(runs: Runs, scenario: Scenario, transformation: str, values: Sequence[f
         episode = runs.play(scenario, "fixed_point", a=a, **given)
         error = float(episode.position_error[counted].max())
         diverged = bool((episode.status == int(Status.DIVERGED)).any())
-        tried.append(Best(error, a, not diverged and error < visible))
+        tried.append(Best(error, not diverged and error < visible))
     return min(tried, key=lambda one: (not one.success, one.error))
 
 
@@ -111,7 +92,6 @@ def distortions(runs: Runs) -> FloatArray:
 
 
 def stagnation(runs: Runs) -> Finding:
-    """Mean speed of the joint that inversion moves fastest, in the steps in which inversion yanks."""
     figures = {}
     for scenario in singular_places(runs):
         method, inversion = (np.abs(runs.play(scenario, p).qdot) for p in ("fixed_point", "moore_penrose"))
@@ -121,51 +101,40 @@ def stagnation(runs: Runs) -> Finding:
             speeds = [float(qdot[yanked, joint].mean()) for qdot in (inversion, method)]
             figures[f"{short(scenario.name)}, q{joint + 1}"] = speeds
     holds = bool(figures) and all(YANK * method < inversion for inversion, method in figures.values())
-    stretched = {p: float(np.abs(runs.play(STRETCHED, p).qdot).max()) for p in ("fixed_point", "moore_penrose")}
-    return Finding(holds, scaled(figures, "rad/s"), stretched)
+    return Finding(holds, scaled(figures, "rad/s"))
 
 
 def damping_distorts(runs: Runs) -> Finding:
-    """Errors away from singular points."""
     policies = ("moore_penrose", "dls", "fixed_point")
     errors = {policy: rms(runs.play(TRAJECTORIES[1], policy).position_error) for policy in policies}
     return Finding(errors["dls"] > errors["moore_penrose"], scaled(errors, "µm"))
 
 
 def distortion(runs: Runs) -> Finding:
-    """Exponents of μ and λ_min in the relative distortion of the nominal velocities."""
     mu, least, relative = distortions(runs)
     design = np.stack([np.ones_like(mu), np.log(mu), np.log(least)], axis=1)
     _, of_mu, of_least = np.linalg.lstsq(design, np.log(relative), rcond=None)[0]
     holds = bool(abs(of_mu - 1.0) < 0.2 and abs(of_least + 1.0) < 0.2)
-    quantiles = np.quantile(relative * least / mu, (0.05, 0.95)).tolist()
-    return Finding(holds, {"μ": float(of_mu), "λ_min": float(of_least)}, {"distortion λ_min/μ": quantiles})
+    return Finding(holds, {"μ": float(of_mu), "λ_min": float(of_least)})
 
 
 def two_joints(runs: Runs) -> Finding:
-    """Share of all configurations with the real parts of both eigenvalues of one sign."""
     positive, negative = planar_signs(runs)
     return Finding(max(positive, negative) < 1.0, scaled({"positive": positive, "negative": negative}, "%"))
 
 
 def sign_works_for_two_joints(runs: Runs) -> Finding:
-    """The best run over A of both readings of σ, and without σ, on two paths of the planar arm."""
     bent = {t: best(runs, runs.scenario(PLANAR), t) for t in (*SIGNS, "none")}
     wide = {t: best(runs, turning(runs), t) for t in (*SIGNS, "none")}
-    wrong = {t: best(runs, runs.scenario(PLANAR), t, values=(-1.0,)) for t in SIGNS}
     figures: dict[str, Any] = {"bent [mm]": [1e3 * one.error for one in bent.values()]}
     figures["turning [mm]"] = [1e3 * one.error for one in wide.values()]
-    more = {f"A, {name}": [one.a for one in tried.values()] for name, tried in (("bent", bent), ("turning", wide))}
-    more["A = -1 [m]"] = [one.error for one in wrong.values()]
-    return Finding({reading: bent[reading].success for reading in SIGNS}, figures, more)
+    return Finding({reading: bent[reading].success for reading in SIGNS}, figures)
 
 
 def sign_variant(runs: Runs) -> Finding:
-    """The best run over A of both readings of σ, with 3 joints."""
-    holds, figures, more = {}, {}, {}
+    holds, figures = {}, {}
     for scenario in (*map(runs.scenario, TRAJECTORIES), one_sign(runs)):
         tried = [best(runs, scenario, t) for t in SIGNS]
         holds[short(scenario.name)] = not any(one.success for one in tried)
         figures[short(scenario.name)] = [one.error for one in tried]
-        more[f"A, {short(scenario.name)}"] = [one.a for one in tried]
-    return Finding(holds, scaled(figures, "mm"), more)
+    return Finding(holds, scaled(figures, "mm"))

@@ -45,17 +45,14 @@ def _compensates(runs: Runs, error: str, unit: str) -> Finding:
 
 
 def compensates_position(runs: Runs) -> Finding:
-    """Position errors."""
     return _compensates(runs, "position", "mm")
 
 
 def compensates_orientation(runs: Runs) -> Finding:
-    """Orientation errors."""
     return _compensates(runs, "angle", "rad")
 
 
 def precise_model(runs: Runs) -> Finding:
-    """Errors with an exact model beside those with the approximate one."""
     figures: dict[str, Any] = {}
     holds = True
     for name, path in PATHS.items():
@@ -75,29 +72,20 @@ def _probing(qdot: FloatArray) -> float:
 
 
 def no_exploration(runs: Runs) -> Finding:
-    """Steps in which one joint moves alone, as the investigation of each direction would take."""
     shares = {name: _probing(runs.play(Q7Q8, name).qdot) for name in (METHOD, *CLOSED_LOOPS)}
-    positions = {name: errors(runs, Q7Q8, name).position for name in shares}
     holds = {
         "the method": shares[METHOD] == 0.0,
         "beside inversion": all(shares[name] > shares[METHOD] for name in CLOSED_LOOPS),
     }
-    return Finding(holds, scaled(shares, "%"), scaled(positions, "mm"))
+    return Finding(holds, scaled(shares, "%"))
 
 
 def less_hectic(runs: Runs) -> Finding:
-    """Peak joint velocities and travel beside two closed loops."""
-    peaks, more = {}, {}
-    for name in (METHOD, *CLOSED_LOOPS):
-        episode = runs.play(Q7Q8, name)
-        peaks[name] = float(np.abs(episode.qdot).max())
-        more[f"{name}, after point 10 [rad/s]"] = float(np.abs(episode.qdot[600:]).max(initial=0.0))
-        more[f"{name}, travel [rad]"] = float(np.abs(np.diff(episode.q, axis=0)).sum())
-    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"), more)
+    peaks = {name: float(np.abs(runs.play(Q7Q8, name).qdot).max()) for name in (METHOD, *CLOSED_LOOPS)}
+    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"))
 
 
 def compensates_manufacturing(runs: Runs) -> Finding:
-    """As the claims on compensation, with arms that differ from the model by errors of several sizes."""
     path, holds, figures = three_seconds(runs), {}, {}
     for size in DEVIATIONS:
         arms = manufactured_arms(path, size)
@@ -111,7 +99,6 @@ def compensates_manufacturing(runs: Runs) -> Finding:
 
 
 def needs_precise_measurement(runs: Runs) -> Finding:
-    """Whether an error grows with noise in the measured pose."""
     path, figures = three_seconds(runs), {}
     holds: dict[str, bool] = {}
     plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))

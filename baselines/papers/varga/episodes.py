@@ -41,10 +41,6 @@ def time_of_step(runs: Runs, **parameters: Any) -> float:
     """The median processor time of a step of the method, over the first 100 of the fast trajectory, in [s].
 
     Steps of some milliseconds are interrupted by other programs, whose time is not counted.
-
-    Args:
-        runs: Shortens the scenario in a trial.
-        **parameters: The policy's parameters.
     """
     scenario = runs.scenario(FAST)
     policy, times, state = make(METHOD, scenario, **parameters), [], None

@@ -45,16 +45,9 @@ def _cost(scenario: Scenario, q: FloatArray, nominal: FloatArray, qdot: FloatArr
 
 
 def descend(scenario: Scenario, q: FloatArray, nominal: FloatArray, steps: int) -> FloatArray:
-    """Some steps of the descent of section IV from rest, without its stop test.
+    """Joint velocities of the horizon after some steps of the descent of section IV from rest, without its stop test.
 
-    Args:
-        scenario: With task ``skew``.
-        q: Joint coordinates at the first grid point, in [rad] or [m]. Shape (n,).
-        nominal: Nominal task coordinates of the second and later grid points. Shape (HL - 1, 6).
-        steps: Steps of the descent.
-
-    Returns:
-        The joint velocities of the horizon, in [rad/s] or [m/s]. Shape (HL - 1, n).
+    Joint coordinates at the first grid point (n,), in [rad] or [m], and skew coordinates of the later ones (HL - 1, 6).
     """
     qdot, alpha, last = np.zeros((len(nominal), len(q))), 1e-8, 0.0
     for step in range(steps):

@@ -26,16 +26,7 @@ from baselines.papers.zhang.episodes import (
     settled_error,
     settled_from,
 )
-from baselines.papers.zhang.targets import (
-    SHARES,
-    TARGETS,
-    at_rest,
-    drawn,
-    iterates,
-    met,
-    rank_correlation,
-    sugihara,
-)
+from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn, iterates, met, rank_correlation, sugihara
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.status import Status
 from ikgym import Plant
@@ -44,7 +35,6 @@ from ikgym.scenarios import Scenario
 
 
 def poles(runs: Runs) -> Finding:
-    """Largest eigenvalue of (9), and of (29) for n = 5, with the Jacobians along example 1."""
     episode = predictive(runs)
     jacobians = jacobians_used(runs.scenario(HELIX), episode)[settled_from(episode) :]
     transposed = jacobians.transpose(0, 2, 1)
@@ -60,37 +50,29 @@ def poles(runs: Runs) -> Finding:
 
 
 def error_grows_with_lambda(runs: Runs) -> Finding:
-    """Largest error after the transient with constant λ."""
     errors = [settled_error(constant(runs, HELIX, damping)) for damping in (0.0, 0.2, 2.0, 20.0, 200.0)]
     return Finding(bool((np.diff(errors) > 0.0).all()), {"[m]": errors})
 
 
 def large_lambda(runs: Runs) -> Finding:
-    """Error at the last sample with λ = 2 and 200 m²."""
     small, large = (float(constant(runs, HELIX, damping).position_error[-1]) for damping in (2.0, 200.0))
     return Finding(large > small, {"[m]": (small, large)})
 
 
 def static_error(runs: Runs) -> Finding:
-    """Distance of the error on a ramp from eq. 10, as a share."""
     apart: dict[str, float] = {}
-    more: dict[str, float] = {}
     for damping in (0.2, 2.0, 20.0):
         error, formula = ramp_errors(runs, 1e-3, damping)
         apart[f"λ = {damping:g}"] = float(np.linalg.norm(error - formula) / np.linalg.norm(formula))
-        more[f"λ = {damping:g} [m]"] = float(np.linalg.norm(error))
-    return Finding(max(apart.values()) < SAME, scaled({"": list(apart.values())}, "%"), more)
+    return Finding(max(apart.values()) < SAME, scaled({"": list(apart.values())}, "%"))
 
 
 def no_static_error(runs: Runs) -> Finding:
-    """Order of the error in the velocity; the curvature of the kinematics leaves an error of the second order."""
     orders: dict[str, float] = {}
-    more: dict[str, float] = {}
     for name, horizon in (("MFAC", 1), ("MFAPC", 5)):
         fast, slow = (float(np.linalg.norm(ramp_errors(runs, v, 0.0, horizon)[0])) for v in (1e-2, 1e-3))
         orders[name] = float(np.log10(fast / slow))
-        more |= {f"{name}, 10 mm a sample [m]": fast, f"{name}, 1 mm a sample [m]": slow}
-    return Finding(min(orders.values()) > 1.9, orders, more)
+    return Finding(min(orders.values()) > 1.9, orders)
 
 
 def _falls_with_lambda(values: Mapping[str, list[float]], unit: str, peaks: Mapping[str, list[float]]) -> Finding:
@@ -104,7 +86,6 @@ def _falls_with_lambda(values: Mapping[str, list[float]], unit: str, peaks: Mapp
 
 
 def robustness(runs: Runs) -> Finding:
-    """Targets lost with a wrong model, and peak joint velocities near singular points, by λ."""
 
     def lost(share: float, links: float) -> float:
         return float((at_rest(runs, share, 0.1, links=links)[0][-1] >= SAME).mean())
@@ -119,10 +100,9 @@ def robustness(runs: Runs) -> Finding:
 
 
 def fastest_without_damping(runs: Runs) -> Finding:
-    """Samples until the error stays below 1 %, by λ, and overshoot of λ = 0, for three distances."""
     holds: dict[str, bool] = {}
     figures: dict[str, float | list[float]] = {}
-    more: dict[str, list[float]] = {}
+    undamped: list[float] = []
     for shift in (0.01, 0.1, 0.3):
         samples, overshoots = [], []
         for share in SHARES:
@@ -133,12 +113,11 @@ def fastest_without_damping(runs: Runs) -> Finding:
             overshoots.append(float(np.percentile(beyond.max(axis=0), 95)))
         holds[f"{shift:g} rad"] = samples[0] == min(samples) and overshoots[0] < SAME
         figures[f"{shift:g} rad:"] = samples
-        more[f"{shift:g} rad"] = overshoots
-    return Finding(holds, figures | {"overshoot [%]": [100.0 * of[0] for of in more.values()]}, more)
+        undamped.append(100.0 * overshoots[0])
+    return Finding(holds, figures | {"overshoot [%]": undamped})
 
 
 def robustness_on_plants(runs: Runs) -> Finding:
-    """Largest error in a loop with a delay, peak joint velocity with noise, by λ."""
     errors: dict[str, list[float]] = {}
     peaks: dict[str, list[float]] = {}
     plants = {
@@ -158,7 +137,6 @@ def robustness_on_plants(runs: Runs) -> Finding:
 
 
 def model_free(runs: Runs) -> Finding:
-    """Error with the exact model and on the worst of three arms for each calibration, by example and controller."""
     calibrations = {"fine": (5e-4, 3e-4), "coarse": (1e-2, 1e-2)}
     controllers: dict[str, dict[str, Any]] = {
         "(5)": {"one_step": True, "rule": "constant", "damping": 0.0},
@@ -166,7 +144,6 @@ def model_free(runs: Runs) -> Finding:
     }
     holds: dict[str, bool] = {}
     figures: dict[str, list[float]] = {}
-    more: dict[str, list[float]] = {}
     for (place, path), (controller, options) in itertools.product(
         (("helix", HELIX), ("line", LINE)), controllers.items()
     ):
@@ -183,21 +160,17 @@ def model_free(runs: Runs) -> Finding:
             wrong = [error(source.drawn_plant(seed).arm) for seed in range(3)]
             holds[f"{name}, {which}"] = not larger(max(wrong), exact)
             figures[name].append(max(wrong))
-            more[f"{name}, {which} [m]"] = wrong
-    return Finding(holds, scaled(figures, "mm"), more)
+    return Finding(holds, scaled(figures, "mm"))
 
 
 def levenberg_marquardt(runs: Runs) -> Finding:
-    """Largest distance of ten iterates from those of the normal equations."""
-    apart, more = {}, {}
+    apart = {}
     for name in TARGETS:
         targets = drawn(runs, name)
         damping = 1e-3 * typical_link(targets.scenario.arm) ** 2
         ours, theirs = iterates(targets, rule="sugihara", weight=1.0, damping=damping), sugihara(targets, damping)
         apart[name] = max(float(np.abs(a.q - b).max()) for a, b in zip(ours, theirs, strict=True))
-        rises = (np.diff([i.error for i in ours], axis=0) > 0.0).any(axis=0)
-        more[f"{name}, share with a rise of the error"] = float(rises.mean())
-    return Finding(max(apart.values()) < 1e-6, {"[rad]": max(apart.values())}, {**apart, **more})
+    return Finding(max(apart.values()) < 1e-6, {"[rad]": max(apart.values())})
 
 
 def _correlations(runs: Runs, name: str) -> tuple[float, float]:
@@ -211,13 +184,11 @@ def _correlations(runs: Runs, name: str) -> tuple[float, float]:
 
 
 def error_and_change_of_j(runs: Runs) -> Finding:
-    """Rank correlation from iteration to iteration."""
     found = {name: _correlations(runs, name)[0] for name in TARGETS}
     return Finding(min(found.values()) > 0.1, found)
 
 
 def error_and_condition(runs: Runs) -> Finding:
-    """Rank correlation from iteration to iteration, and along four paths."""
     found = {name: _correlations(runs, name)[1] for name in TARGETS}
     for name in (HELIX, LINE, *SINGULAR):
         scenario, episode = runs.scenario(name), constant(runs, name, of_link(runs, name, 1e-3))
@@ -241,7 +212,6 @@ def rule_14(runs: Runs) -> Finding:
     holds: dict[str, bool] = {}
     left: list[float] = []
     figures: dict[str, list[float]] = {}
-    more: dict[str, list[float]] = {}
     for a, b in ((1.1, 1.02), (2.0, 2.0), (10.0, 10.0)):
         numbers = {"rule": "error_ratio", "growth": a, "decay": b}
         rules = {f"{share}": {**numbers, "damping": share} for share in (0.1, 0.001)}
@@ -249,13 +219,11 @@ def rule_14(runs: Runs) -> Finding:
         holds[f"{a:g}, {b:g}"] = all(min(shares) >= shares[0] - 0.005 for shares in found.values())
         for targets, (undamped, *shares) in found.items():
             figures.setdefault(targets, [undamped]).append(min(shares))
-            more[f"{targets}, {a:g}, {b:g}"] = shares
         left.append(max(met(runs, "stretched", rule)[1] for rule in rules.values()))
-    return Finding(holds, {**scaled(figures, "%"), **scaled({"left": left}, "µm")}, more)
+    return Finding(holds, {**scaled(figures, "%"), **scaled({"left": left}, "µm")})
 
 
 def rule_18(runs: Runs) -> Finding:
-    """Targets met with λ = 0 and three choices of a₁ and a₂: of (44), with faster decay, the default of (14)."""
     rules = {
         f"{a}, {b}": {"rule": "threshold", "growth": a, "decay": b, "damping": 1e-3}
         for a, b in ((1.1, 1.02), (1.1, 1.2), (2.0, 2.0))
@@ -264,7 +232,6 @@ def rule_18(runs: Runs) -> Finding:
 
 
 def look_up(runs: Runs) -> Finding:
-    """Targets met with λ = 0, with Table I and with (37), each also with milder values."""
     milder = ((0.0, 0.0, 0.0), (1e-8, 1e-6, 1e-4), (1e-6, 1e-4, 1e-3))
     rules: dict[str, dict[str, Any]] = {
         "Table I": {"rule": "table"},
@@ -276,7 +243,6 @@ def look_up(runs: Runs) -> Finding:
 
 
 def constant_lambda(runs: Runs) -> Finding:
-    """Mean iterations with three constant λ; the line of example 2 stays away from singular points."""
     episodes = [runs.play(LINE, "mfac", rule="constant", damping=damping) for damping in (0.0, 1e-4, 1e-3)]
     means = [float(episode.iterations.mean()) for episode in episodes]
     shares = [float((episode.status == Status.CONVERGED).mean()) for episode in episodes]

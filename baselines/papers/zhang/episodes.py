@@ -89,11 +89,7 @@ def of_link(runs: Runs, scenario: str, share: float) -> float:
 def ramp_errors(runs: Runs, velocity: float, damping: float, horizon: int = 1) -> tuple[FloatArray, FloatArray]:
     """The static error on a straight ramp of example 1's arm, measured and by eq. 10, in [m].
 
-    Args:
-        runs: Plays the episode.
-        velocity: Way of one period, in [m].
-        damping: λ in [m²].
-        horizon: n.
+    The velocity is the way of one period in [m], the damping λ in [m²], and the horizon n.
     """
     scenario, q = runs.scenario(HELIX), np.array([0.3, 0.6, 1.0])
     steps = min(scenario.steps, 400)
@@ -115,12 +111,7 @@ def ramp_errors(runs: Runs, velocity: float, damping: float, horizon: int = 1) -
 def along_the_helix(runs: Runs, policy: str, ahead: int, *, hold: bool = False, **parameters: Any) -> FloatArray:
     """Inputs of single steps from all states of example 1, the first, singular one left out. Shape (steps - 1, 3).
 
-    Args:
-        runs: Plays the episode.
-        policy: The policy.
-        ahead: Its preview.
-        hold: Whether the first point of the preview is repeated.
-        **parameters: The policy's parameters.
+    The policy sees so many steps ahead; with ``hold`` the first point is repeated.
     """
     scenario, episode = runs.scenario(HELIX), predictive(runs)
     nominal, steps = scenario.nominal(preview=ahead), len(episode.q)

@@ -10,15 +10,7 @@ from matplotlib.figure import Figure
 from baselines.papers.drawing import Curve, Panel, compared, picture
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs
-from baselines.papers.zhang.episodes import (
-    HELIX,
-    LINE,
-    iterative,
-    jacobians_used,
-    lambdas_used,
-    outputs,
-    predictive,
-)
+from baselines.papers.zhang.episodes import HELIX, LINE, iterative, jacobians_used, lambdas_used, outputs, predictive
 from ikgym.validation import FloatArray
 
 AXES = ("x", "y", "z")

@@ -33,13 +33,7 @@ TARGETS: dict[str, tuple[str, float, int | None]] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Targets:
-    """Targets of the inverse kinematics, and initial guesses.
-
-    Args:
-        scenario: The scenario of the arm and the task.
-        q: Joint coordinates at the start in [rad]. Shape (rows, n).
-        coordinates: Task coordinates of the targets. Shape (rows, m).
-    """
+    """Targets of the inverse kinematics, task coordinates (rows, m), and initial guesses (rows, n) in [rad]."""
 
     scenario: Scenario
     q: FloatArray
@@ -80,10 +74,7 @@ def drawn(runs: Runs, name: str) -> Targets:
 def met(runs: Runs, name: str, rule: Mapping[str, Any]) -> tuple[float, float]:
     """The share of a set of targets that `mfac` meets to δ = 1e-10 in 500 iterations, and the median error left.
 
-    Args:
-        runs: Says how many targets.
-        name: One of :data:`TARGETS`.
-        rule: Parameters of the rule for λ, which and whose tables are given in l².
+    The dampings of the rule for λ are in l².
     """
     targets, square = drawn(runs, name), of_link(runs, TARGETS[name][0], 1.0)
     in_metres = {key: (square * np.array(rule[key])).tolist() for key in ("damping", "dampings") if key in rule}
@@ -93,13 +84,7 @@ def met(runs: Runs, name: str, rule: Mapping[str, Any]) -> tuple[float, float]:
 
 
 class Iterate(NamedTuple):
-    """The states of all targets' solutions at one iteration.
-
-    Attributes:
-        q: Joint coordinates in [rad]. Shape (rows, n).
-        error: Norm of the task error. Shape (rows,).
-        jacobian: Jacobian of the task. Shape (rows, e, n).
-    """
+    """The states of all targets' solutions at one iteration in [rad], with norm and Jacobian of the task error."""
 
     q: FloatArray
     error: FloatArray
@@ -144,16 +129,10 @@ def _regular(arm: Arm, rows: int, shift: float) -> tuple[FloatArray, FloatArray]
 
 
 def at_rest(runs: Runs, share: float, shift: float, *, links: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """The response of `mfac` with `one_step` to 200 targets at rest, with example 1's arm.
+    """The response of `mfac` with `one_step` to 200 targets at rest at a distance in [rad], with example 1's arm.
 
-    Args:
-        runs: Says how many targets.
-        share: λ in l².
-        shift: Distance of a target, in [rad].
-        links: Length of the model's links as a share of the true ones.
-
-    Returns:
-        The error, and the way beyond the target, as shares of the distance at the start: shapes (periods, rows).
+    λ is a share of l², the length of the model's links one of the true ones. Gives the error, and the way beyond the
+    target, as shares of the distance at the start: shapes (periods, rows).
     """
     scenario = runs.scenario(HELIX)
     arm = scenario.arm

@@ -1,8 +1,7 @@
+import concurrent.futures
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 
 import pytest
 
@@ -17,10 +16,6 @@ from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 
 NAME = "varga7-fast"
-
-
-def short_panda():
-    return ikgym.scenarios.get("panda-ideal").replace(steps=20)
 
 
 def short(steps=20):
@@ -59,12 +54,8 @@ def test_the_data_of_the_package_are_in_order():
         assert lookup(scenario, known.seed, arm_seed) == known, "the episode has changed since: find its cost anew"
         assert known.cost >= 0.0
         assert known.found_by
-    assert best_known.DATA.read_text(encoding="utf-8") == text_of(there)
-
-
-def text_of(records):
-    lines = [json.dumps(dataclasses.asdict(r), ensure_ascii=False) for r in records]
-    return "[\n" + ",\n".join(lines) + ("\n]\n" if lines else "]\n")
+    lines = ",\n".join(json.dumps(dataclasses.asdict(r), ensure_ascii=False) for r in there)
+    assert best_known.DATA.read_text(encoding="utf-8") == f"[\n{lines}\n]\n"
 
 
 def test_a_record_comes_back_and_belongs_to_its_content(file, monkeypatch):
@@ -94,7 +85,7 @@ def test_the_better_is_kept(file):
 
 
 def test_scenarios_in_which_the_same_arm_moves_share_records(file):
-    plain = short_panda()
+    plain = ikgym.scenarios.get("panda-ideal").replace(steps=20)
     late = plain.replace(name="late", plant=Plant(bandwidth=20.0, pose_noise=1e-3))
     record([one(plain, 10.0)], file)
     assert lookup(late, 0).cost == 10.0
@@ -105,26 +96,16 @@ def test_scenarios_in_which_the_same_arm_moves_share_records(file):
 
 
 def test_another_arm_has_another_record(file):
-    calibrated = short_panda().replace(plant=Plant(zero=1e-3))
+    plain = ikgym.scenarios.get("panda-ideal").replace(steps=20)
+    calibrated = plain.replace(plant=Plant(zero=1e-3))
     noisy = calibrated.replace(plant=Plant(zero=1e-3, pose_noise=1e-3, command_delay=2))
     record([one(stripped(calibrated, 0), 10.0)], file)
     assert cost(calibrated, 0) == cost(noisy, 0) == 10.0
     assert best_known.costs(noisy, [0, 1]) == [10.0, None]
     assert lookup(calibrated, 0, arm_seed=3) is None
-    assert lookup(short_panda(), 0) is None
+    assert lookup(plain, 0) is None
     record([dataclasses.replace(one(stripped(calibrated, 0, 3), 20.0), scenario="another arm")], file)
     assert (cost(noisy, 0, 3), cost(noisy, 0)) == (20.0, 10.0)
-
-
-def test_the_file_is_sorted_and_a_new_record_changes_one_line(file):
-    slow = ikgym.scenarios.get("varga7-slow")
-    record([one(slow, 3.0), one(short(), 2.0, seed=10), one(short(), 1.0, seed=9)], file)
-    before = file.read_text(encoding="utf-8").splitlines()
-    assert [(r.scenario, r.seed) for r in read(file)] == [(NAME, 9), (NAME, 10), ("varga7-slow", 0)]
-    record([one(short(), 1.5, seed=10, spread={"worst": 1.0, "starts": 2})], file)
-    after = file.read_text(encoding="utf-8").splitlines()
-    assert [a == b for a, b in zip(before, after, strict=True)] == [True, True, False, True, True]
-    assert not list(file.parent.glob("*.tmp"))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1.0])
@@ -134,7 +115,7 @@ def test_bad_costs_are_refused_and_nothing_is_written(file, value):
     assert not file.exists()
 
 
-@pytest.mark.parametrize("content", ["{", "[3]", '[{"scenario": "a"}]', "3", "null", "[" * 10_000])
+@pytest.mark.parametrize("content", ["{", "[3]", '[{"scenario": "a"}]', "3"])
 def test_damaged_data_are_named(file, content):
     file.parent.mkdir()
     file.write_text(content, encoding="utf-8")
@@ -151,9 +132,8 @@ def test_cost_ratio_is_the_cost_over_the_best_known(file):
     assert evaluate(short(21), "dls")[0].cost_ratio is None
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-9])
-def test_no_ratio_to_nothing(file, value):
-    record([one(short(), value)], file)
+def test_no_ratio_to_nothing(file):
+    record([one(short(), 1e-9)], file)
     assert cost(short(), 0) is None
     (row,) = evaluate(short(), "dls")
     assert row.cost_ratio is None
@@ -172,50 +152,30 @@ def test_a_record_is_beaten_by_more_than_rounding(file):
     assert beaten(dataclasses.replace(row, total_cost=0.1, fingerprint="0" * 12)) is None
 
 
-# No policy beats a record: whoever finds a better path writes it down.
-
-
-def recorded():
-    """Fixed scenarios with a best known cost that a cost ratio can be stated against."""
-    return [s for s in map(ikgym.scenarios.get, ikgym.scenarios.names()) if not s.random and best_known.cost(s, 0)]
-
-
-def nobody_beats(scenarios, policies):
-    rows = evaluate(scenarios, policies) if scenarios else []
-    better = [(row.scenario, row.policy, row.total_cost) for row in rows if beaten(row)]
-    assert not better, f"write them down with: {best_known.UPDATE}"
-
-
-#: What plans ahead: of the other policies none has come nearer to a record than 0.08 %.
-PLANNERS = ["rhc", "rhc_foresight"]
 #: Records that as many polished paths have led to, from different starts, are not expected to be beaten.
 AGREED = 3
 
 
-def doubtful():
-    """Names of the scenarios whose record few paths have led to."""
-    return [s.name for s in recorded() if best_known.lookup(s, 0).spread["polished_within_1e-6"] < AGREED]
+#: Fixed scenarios whose record few paths have led to.
+DOUBTFUL = [r.scenario for r in read() if r.seed == 0 and r.cost > 1e-9 and r.spread["polished_within_1e-6"] < AGREED]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*doubtful(), "varga7-fast", "panda-line", "iiwa14-fast"])
-def test_no_planner_beats_a_record(name):
-    nobody_beats([ikgym.scenarios.get(name)], PLANNERS)
+@pytest.mark.parametrize("name", DOUBTFUL)
+def test_no_foresight_beats_a_record(name):
+    better = [row.total_cost for row in evaluate(name, "rhc_foresight") if beaten(row)]
+    assert not better, f"write them down with: {best_known.UPDATE}"
 
 
-WRITER = """
-import pathlib, sys
-from baselines.oracle.best_known import Record, record
-path, first = pathlib.Path(sys.argv[1]), int(sys.argv[2])
-for seed in range(first, first + 40):
-    record([Record("varga7-random", seed, 1.0, "a test", 0.0, {}, "0" * 12)], path)
-"""
-
-
-def test_two_processes_lose_no_record(tmp_path):
+def test_two_writers_lose_no_record(tmp_path):
+    """That the folder is locked against other processes is tested with :func:`baselines.files.locked`."""
     path = tmp_path / "best.json"
-    command = [sys.executable, "-c", WRITER, str(path)]
-    writers = [subprocess.Popen([*command, str(first)]) for first in (0, 1000)]
-    assert [writer.wait() for writer in writers] == [0, 0]
+
+    def write(first):
+        for seed in range(first, first + 40):
+            record([Record("varga7-random", seed, 1.0, "a test", 0.0, {}, "0" * 12)], path)
+
+    with concurrent.futures.ThreadPoolExecutor() as pool:
+        list(pool.map(write, (0, 1000)))
     assert [one.seed for one in read(path)] == [*range(40), *range(1000, 1040)]
     assert [file.name for file in tmp_path.iterdir()] == ["best.json"]

@@ -10,7 +10,6 @@ import baselines
 import ikgym
 from baselines.cli.commands import oracle as optimum_command
 from baselines.episodes import rollout
-from baselines.evaluation import test_sets
 from baselines.fingerprints import episode_hash
 from baselines.oracle import Search, Start, best_known, cache, local_search, solve
 from baselines.oracle.episode import EpisodeProblem
@@ -35,8 +34,8 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "cache" / "oracle"
 
 
-def short(name="varga7-fast", steps=30, **changes):
-    return ikgym.scenarios.get(name).replace(steps=steps, **changes)
+def short(like="varga7-fast", steps=30, **changes):
+    return ikgym.scenarios.get(like).replace(steps=steps, **changes)
 
 
 CASES = {
@@ -45,16 +44,12 @@ CASES = {
     "off the path": (short(start=np.full(7, 0.01)), 0),
     "held": (short("khan8-q7q8", 130), 0),
     "held at times": (short(iterations_per_point=(3, 1, 1, 2, 1)), 0),
-    "ends while a point is held": (short(steps=8, iterations_per_point=3), 0),
     "another measured start": (short("zhang3-helix"), 0),
     "position": (short("faitli3-regular"), 0),
     "pose": (short("zhang6-lspb"), 0),
-    "random pose": (short("varga7-pose-random"), 1_000_003),
-    "axis": (short("zhang6-lspb", task=ikgym.tasks.get("axis")), 0),
     "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
     "one step": (short(steps=1), 0),
 }
-cases = pytest.mark.parametrize(("scenario", "seed"), CASES.values(), ids=CASES)
 
 
 def rolled(scenario, seed, name="oracle", **parameters):
@@ -63,7 +58,7 @@ def rolled(scenario, seed, name="oracle", **parameters):
     return episode, float(np.sum(episode.tracking_cost + episode.velocity_cost))
 
 
-@cases
+@pytest.mark.parametrize(("scenario", "seed"), CASES.values(), ids=CASES)
 def test_an_optimum_is_what_the_environment_charges_and_nothing_tried_is_cheaper(scenario, seed):
     optimum = solve(scenario, seed, QUICK)
     assert optimum.q.shape == optimum.qdot.shape == (scenario.steps, scenario.joints)
@@ -84,8 +79,9 @@ def test_an_optimum_is_what_the_environment_charges_and_nothing_tried_is_cheaper
         assert optimum.cost <= rolled(scenario, seed, name)[1] * (1.0 + 1e-9) + 1e-9
 
 
-@cases
-def test_the_policy_plays_the_optimum(scenario, seed):
+@pytest.mark.parametrize("name", ["random", "held", "another measured start", "narrow limits"])
+def test_the_policy_plays_the_optimum(name):
+    scenario, seed = CASES[name]
     optimum = solve(scenario, seed, Search(starts=0, generations=0))
     episode, cost = rolled(scenario, seed, starts=0, generations=0)
     # What float32 actions leave.
@@ -93,32 +89,16 @@ def test_the_policy_plays_the_optimum(scenario, seed):
     assert_allclose(episode.q, optimum.q, rtol=0, atol=1e-5 * scenario.dt / 1e-3)
 
 
-@cases
-def test_commands_lead_along_a_path(scenario, seed):
-    whole = EpisodeProblem.of(scenario, seed)
-    steps = np.random.default_rng(0).uniform(-1.0, 1.0, (whole.knots, scenario.joints))
-    path = whole.start + scenario.dt * np.cumsum(steps * whole.grid.length[:, None], axis=0)
-    qdot = whole.commands(path)
-    q, _ = whole.play(qdot)
-    assert_allclose(q[whole.grid.at - 1], path, rtol=0, atol=1e-12)
-    held = np.diff(whole.grid.at, prepend=0) > 1
-    assert not qdot[whole.grid.at[held] - 1].any()
-
-
-@pytest.mark.parametrize("name", ["varga7-random", "khan8-q1"])
-def test_the_same_whatever_the_number_of_threads(monkeypatch, name):
-    scenario = short(name, 65)
-    results = []
-    for cores in (1, 2, 5):
+def test_the_same_whatever_the_number_of_threads(monkeypatch):
+    scenario, results = short("varga7-random", 65), []
+    for cores in (1, 5):
         monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
         optimum = solve(scenario, 3, QUICK, cached=False)
         results.append((optimum.q, optimum.qdot, optimum.cost, *(dataclasses.astuple(one) for one in optimum.starts)))
     assert identical(results[0][:3], results[1][:3])
-    assert identical(results[0][:3], results[2][:3])
-    assert results[0][3:] == results[1][3:] == results[2][3:]
-    if name == "varga7-random":
-        other = solve(scenario, 3, QUICK.replace(seed=1), cached=False)
-        assert [one.coarse for one in other.starts] != [one.coarse for one in optimum.starts]
+    assert results[0][3:] == results[1][3:]
+    other = solve(scenario, 3, QUICK.replace(seed=1), cached=False)
+    assert [one.coarse for one in other.starts] != [one.coarse for one in optimum.starts]
 
 
 def test_kinds_of_starts():
@@ -161,46 +141,23 @@ def test_what_is_said_of_the_starts():
     assert free.spread == {"polished": 2, "polished_within_1e-6": 2, "without_search": 1e-16}
 
 
-@pytest.fixture(scope="module")
-def costly():
-    """Two paths of which the first is a hundred times too costly, their costs, and what they are paths of."""
+def test_the_local_search_finds_what_a_start_does_not():
+    """Of two paths the first is a hundred times too costly."""
     whole = EpisodeProblem.of(ikgym.scenarios.get("varga7-random"), 1_000_011)
     problem = whole.on(whole.coarse(25))
-    paths = np.empty((2, len(problem.grid.at), 7))
-    local_search.random_paths(problem, 0, paths, 0, 2)
+    before = np.empty((2, len(problem.grid.at), 7))
+    local_search.random_paths(problem, 0, before, 0, 2)
     improved = local_search.Improved(*np.empty((3, 2)))
-    local_search.improve(problem, NewtonSettings(False, 50, 1e-4), paths, improved, 0, 2)
-    return problem, paths, improved.costs
-
-
-def test_a_path_gets_never_worse(costly):
-    problem, before, _ = costly
-    paths, last = before.copy(), np.full(2, np.inf)
-    for _ in range(60):
-        improved = local_search.Improved(*np.empty((3, 2)))
-        local_search.improve(problem, NewtonSettings(True, 1, 1e-12), paths, improved, 0, 2)
-        assert (improved.costs <= last).all()
-        last = improved.costs
-
-
-def searched(costly, rounds, *chunks):
-    problem, before, costs_before = costly
-    paths, costs = before.copy(), costs_before.copy()
-    for first, last in chunks:
-        local_search.iterated_local_search(problem, 0, rounds, before, paths, costs, first, last)
-    return paths, costs
-
-
-def test_the_local_search_finds_what_a_start_does_not(costly):
-    _, before, costs_before = costly
-    paths, costs = searched(costly, 40, (0, 1))
-    assert costs[0] < 0.1 * costs_before[0]
-    assert costs[1] == costs_before[1]
+    local_search.improve(problem, NewtonSettings(False, 50, 1e-4), before, improved, 0, 2)
+    paths, costs = before.copy(), improved.costs.copy()
+    local_search.iterated_local_search(problem, 0, 40, before, paths, costs, 0, 1)
+    assert costs[0] < 0.1 * improved.costs[0]
+    assert costs[1] == improved.costs[1]
     assert identical(paths[1], before[1])
 
 
 class TestGrid:
-    @pytest.mark.parametrize("steps", [1, 9, 37])
+    @pytest.mark.parametrize("steps", [1, 37])
     @pytest.mark.parametrize("stride", [1, 5])
     def test_a_coarse_grid_counts_all_steps(self, steps, stride):
         for held in (1, (2, 1, 1, 3, 1)):
@@ -245,8 +202,7 @@ def test_limits_are_kept_and_cost_what_they_must():
         policy = baselines.make("oracle", scenario, starts=0, generations=0)
         assert not rollout(scenario, policy, 0).at_limit.any()
         assert optimum.cost >= solve(free, 0, QUICK).cost
-        for name in ("dls", "rhc", "follow_nominal"):
-            assert optimum.cost <= rolled(scenario, 0, name)[1] * (1.0 + 1e-9), (names, name)
+        assert optimum.cost <= rolled(scenario, 0, "rhc")[1] * (1.0 + 1e-9), names
 
 
 def panda_spline(steps=100, **changes):
@@ -276,11 +232,6 @@ def test_limits_of_acceleration_are_kept():
     assert optimum.cost <= best.cost * (1.0 + 1e-6)
 
 
-def test_limits_of_acceleration_and_held_points_are_refused():
-    with pytest.raises(InvalidInputError, match="expected iterations_per_point=1 with the limits of acceleration"):
-        solve(panda_spline(iterations_per_point=3), 0, QUICK)
-
-
 class TestCache:
     def test_a_hit_is_what_was_found(self, folder, monkeypatch):
         fresh = solve(short(), 0, QUICK, cached=False)
@@ -288,7 +239,7 @@ class TestCache:
         first = solve(short(), 0, QUICK)
         assert len(kept(folder)) == 1
         monkeypatch.setattr(cache, "search", None)
-        hit = solve(short(name="varga7-fast").replace(name="other"), 0, QUICK)
+        hit = solve(short(name="other"), 0, QUICK)
         assert hit.scenario == "other"
         with pytest.raises(TypeError):  # searches anew
             solve(short(), 0, QUICK, cached=False)
@@ -308,37 +259,19 @@ class TestCache:
         files.append(cache.file_of(short(), 0, QUICK))
         assert len(set(files)) == len(files)
 
-    @pytest.mark.parametrize("how", ["half", "folder"])
-    def test_a_damaged_file_is_made_anew(self, folder, caplog, how):
+    def test_a_damaged_file_is_made_anew(self, folder, caplog):
         before = solve(short(), 0, QUICK)
         (file,) = kept(folder)
-        whole = file.read_bytes()
-        file.write_bytes(whole[: len(whole) // 2])
-        if how == "folder":
-            file.unlink()
-            file.mkdir()
-        after = solve(short(), 0, QUICK)
+        file.write_bytes(file.read_bytes()[:1000])
+        assert identical(solve(short(), 0, QUICK).q, before.q)
         assert "It is replaced." in caplog.text
-        assert identical(after.q, before.q)
-        if how == "folder":
-            assert "The optimum is not kept" in caplog.text
-        else:
-            caplog.clear()
-            solve(short(), 0, QUICK)
-            assert not caplog.text
-
-
-class TestPolicy:
-    def test_it_is_a_reference_and_needs_a_seed(self):
-        assert baselines.make("oracle", "varga7-fast").reference
-        with pytest.raises(InvalidInputError, match="a seed says which episode"):
-            baselines.make("oracle", "varga7-random")
-        with pytest.raises(InvalidInputError, match="seed: expected a whole number"):
-            baselines.make("oracle", "varga7-random", seed="x")
-        with pytest.raises(InvalidInputError, match="starts: expected a whole number of at least 0, got -1"):
-            baselines.make("oracle", "varga7-fast", starts=-1)
-        with pytest.raises(InvalidInputError, match="found without drives and sensors"):
-            baselines.make("oracle", short(plant=Plant(noise=0.1)))
+        caplog.clear()
+        solve(short(), 0, QUICK)
+        assert not caplog.text
+        file.unlink()
+        file.mkdir()
+        assert identical(solve(short(), 0, QUICK).q, before.q)
+        assert "The optimum is not kept" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -349,6 +282,15 @@ class TestPolicy:
         (lambda: Search(polished=0), InvalidInputError, "polished: expected a whole number of at least 1"),
         (lambda: Search(knots=2.5), InvalidInputError, "knots: expected a whole number"),
         (lambda: solve(short(), arm_seed=1), InvalidInputError, "arm"),
+        (
+            lambda: solve(panda_spline(iterations_per_point=3)),
+            InvalidInputError,
+            "expected iterations_per_point=1 with",
+        ),
+        (lambda: baselines.make("oracle", "varga7-random"), InvalidInputError, "a seed says which episode"),
+        (lambda: baselines.make("oracle", "varga7-random", seed="x"), InvalidInputError, "seed: expected a whole"),
+        (lambda: baselines.make("oracle", "varga7-fast", starts=-1), InvalidInputError, "starts: expected a whole"),
+        (lambda: baselines.make("oracle", short(plant=Plant(noise=0.1))), InvalidInputError, "without drives and sens"),
     ],
 )
 def test_bad_input(call, error, match):
@@ -384,18 +326,25 @@ def data(tmp_path, monkeypatch):
 
 
 class TestCommandLine:
-    HOW = ("--starts", "2", "--generations", "0", "--knots", "30")
-    RANDOM = ("--scenarios", "varga7-random", "--seeds", "1000000", *HOW)
+    RANDOM = ("--scenarios", "short", "--starts", "2", "--generations", "0", "--knots", "30", "--seeds", "1000000")
 
-    def test_update_and_check(self, data, capsys):
+    @pytest.fixture(autouse=True)
+    def scenario(self, monkeypatch):
+        for part in ("_makers", "_made"):
+            monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
+        scenario = short("varga7-random", 100, name="short")
+        ikgym.scenarios.register(scenario)
+        return scenario
+
+    def test_update_and_check(self, data, capsys, scenario):
         assert optimum_command.main([*self.RANDOM, "--check"]) == 1
         assert "no record of this content" in capsys.readouterr().out
         assert optimum_command.main([*self.RANDOM, "--update"]) == 0
-        out = capsys.readouterr().out
-        assert "varga7-random, seed 1000000: 196549.1" in out
-        assert "1 of 1 records are new or better" in out
         (known,) = best_known.read(data)
-        assert known.hash == episode_hash(ikgym.scenarios.get("varga7-random"), 1_000_000)
+        out = capsys.readouterr().out
+        assert f"short, seed 1000000: {known.cost:.10g}" in out
+        assert "1 of 1 records are new or better" in out
+        assert known.hash == episode_hash(scenario, 1_000_000)
         assert optimum_command.main([*self.RANDOM, "--check"]) == 0
         assert optimum_command.main([*self.RANDOM, "--update"]) == 0
         assert "0 of 1 records are new or better" in capsys.readouterr().out
@@ -415,8 +364,7 @@ class TestCommandLine:
             return solved(scenario, seed, *rest)
 
         monkeypatch.setattr(cache, "search", interrupted)
-        seeds = ("--scenarios", "varga7-random", "--seeds", "1000000", "1000001", "1000002")
-        assert optimum_command.main([*seeds, *self.HOW, "--update"]) == 130
+        assert optimum_command.main([*self.RANDOM, "1000001", "1000002", "--update"]) == 130
         assert "are kept" in capsys.readouterr().err
         assert [known.seed for known in best_known.read(data)] == [1_000_000]
 
@@ -432,23 +380,18 @@ class TestCommandLine:
         assert optimum_command.main(arguments) == 2
         assert words in capsys.readouterr().err
 
-    def test_all_fixed_scenarios_and_frozen_sets_if_nothing_is_named(self):
-        todo = {(scenario.name, draw.seed) for scenario, draw in optimum_command.episodes((), (), ())}
-        every = [ikgym.scenarios.get(name) for name in ikgym.scenarios.names()]
-        fixed = {(one.name, 0) for one in every if not (one.random or one.collides)}
-        sets = [one for one in map(test_sets.get, test_sets.names()) if not one.scenario.collides]
-        assert len(sets) == 14
-        assert todo == fixed | {(one.name, seed) for one in sets for seed in one.seeds}
-
 
 # What was recorded.
 
 
 def test_all_episodes_have_a_record():
-    every = optimum_command.episodes((), (), ())
-    missing = [
-        (one.name, draw.seed) for one, draw in every if not best_known.lookup(one, draw.seed, draw.arm_seed)
-    ]  # fmt: skip
+    todo = optimum_command.episodes((), (), ())
+    every = [ikgym.scenarios.get(name) for name in ikgym.scenarios.names()]
+    fixed = {(one.name, 0) for one in every if not (one.random or one.collides)}
+    assert fixed < {(scenario.name, draw.seed) for scenario, draw in todo}
+    own = {(one.scenario, one.seed) for one in best_known.read()}  # of which test_best_known looks each up
+    others = [(one, draw) for one, draw in todo if (one.name, draw.seed) not in own]
+    missing = [(one.name, draw.seed) for one, draw in others if not best_known.lookup(one, draw.seed, draw.arm_seed)]
     assert not missing, f"find them with: {best_known.UPDATE}"
 
 
@@ -459,25 +402,18 @@ def reproduced(name, seed, how):
     assert optimum.cost == pytest.approx(known.cost, rel=1e-6, abs=best_known.MEANINGLESS)
 
 
-def test_a_record_is_reproduced():
-    reproduced("zhang6-lspb", 0, Search(starts=0, generations=0))
-
-
 #: Without random starts and local search: to these records the nominal joint path leads, too.
 FROM_THE_PATH = Search(starts=0, generations=0)
+
+
+def test_a_record_is_reproduced():
+    reproduced("tiago-fast", 0, FROM_THE_PATH)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "how"),
-    [
-        ("varga7-fast", 0, FROM_THE_PATH),
-        ("varga7-slow", 0, FROM_THE_PATH),
-        ("faitli3-shoulder", 0, FROM_THE_PATH),
-        ("khan8-q1", 0, FROM_THE_PATH),
-        ("varga7-random-long", 2_000_003, FROM_THE_PATH),
-        ("varga7-random", 2_000_000, Search()),
-    ],
+    [("varga7-fast", 0, FROM_THE_PATH), ("khan8-q1", 0, FROM_THE_PATH), ("varga7-random", 2_000_000, Search())],
 )
 def test_records_are_reproduced(name, seed, how):
     reproduced(name, seed, how)
@@ -491,7 +427,6 @@ def test_records_are_reproduced(name, seed, how):
     [
         (short(steps=20), 0),
         (short("varga7-pose-random", 20), 2_000_001),
-        pytest.param(short(steps=150), 0, marks=pytest.mark.slow),
         pytest.param(short("varga7-pose-random", 150), 2_000_006, marks=pytest.mark.slow),
     ],
 )

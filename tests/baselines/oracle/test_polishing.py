@@ -40,7 +40,7 @@ def test_a_payload_is_foreseen(optimum):
     assert late.cost == pytest.approx(optimum.cost, rel=1e-9)
 
 
-@pytest.mark.parametrize("plant", [Plant(zero=1e-3), Plant(bandwidth=10.0), Plant(pose_noise=1e-3), Plant(bias=0.1)])
+@pytest.mark.parametrize("plant", [Plant(zero=1e-3), Plant(bandwidth=10.0)])
 def test_of_a_plant_there_is_nothing_but_a_payload(plant):
     with pytest.raises(InvalidInputError, match="expected an ideal plant, but for a payload"):
         EpisodeProblem.of(PLAIN.replace(plant=plant), SEED)

@@ -7,36 +7,11 @@ import types
 import numpy as np
 import pytest
 
-from baselines.papers.comparisons import YANK
-from baselines.papers.faitli import claims as faitli
-from baselines.papers.faitli.episodes import past_shoulder, solved, speeds, yank
 from baselines.papers.khan import claims as khan
-from baselines.papers.khan import section_2, section_5
+from baselines.papers.khan import section_5
 from baselines.papers.khan.episodes import CLOSED_LOOPS, METHOD, Errors
 from baselines.papers.runs import Runs
 from baselines.solvers import fixed_point, resolved_rate
-
-
-def test_inversion_yanks_one_millimetre_from_the_axis_and_the_fixed_point_does_not():
-    runs = Runs()
-    line = past_shoulder(runs, 0.001)
-    np.testing.assert_allclose(np.linalg.norm(line.nominal()[:, :2], axis=1).min(), 1e-3, rtol=0.2)
-    inversion, method = runs.play(line, "moore_penrose"), solved(runs, line)
-    assert speeds(inversion).max() > 500.0
-    assert yank(inversion) > 10.0 * YANK
-    assert speeds(method).max() < 2.0
-    assert yank(method) < 2.0
-    assert method.position_error.max() < 2e-3
-
-
-@pytest.mark.slow
-def test_both_claims_on_yanks_name_the_same_places():
-    runs = Runs()
-    yanks, stagnation = faitli.no_yanks(runs), section_2.stagnation(runs)
-    assert yanks.verdict == stagnation.verdict == "reproduced"
-    yanked = {name for name, (inversion, _) in yanks.figures.items() if inversion > YANK}
-    assert {name.partition(", ")[0] for name in stagnation.figures} == yanked
-    assert len(yanked) == 3
 
 
 def test_both_methods_do_without_factorisations():
@@ -51,7 +26,7 @@ def test_both_methods_do_without_factorisations():
     assert decomposed[fixed_point.__name__] == 0 < decomposed[resolved_rate.__name__]
 
 
-@pytest.mark.parametrize("growth", [0.05, 0.27, 0.3])
+@pytest.mark.parametrize("growth", [0.05, 0.27])
 @pytest.mark.parametrize(("largest", "visible"), [(9.0, True), (1e-9, False)])
 def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible):
     """An error of 9 m is visible on this path, and one of 1 nm is not."""
@@ -65,26 +40,6 @@ def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible
         "beside the run without W": not degraded,
         "beside the extent": not visible,
     }
-
-
-def test_singular_points_are_counted_on_each_calculated_path():
-    """The stretched path, whose joint paths separate, crosses none."""
-    found = faitli.zero_eigenvalues(Runs())
-    assert found.verdict == "depends"
-    assert found.holds == {"stretched": False, "regular": False, "shoulder": True}
-    assert found.figures == {"stretched": [0, 6], "regular": [0, 0], "shoulder": [2, 2]}
-
-
-def test_the_transpose_lags_with_more_joints_than_coordinates_on_the_fast_path():
-    found = faitli.not_square(Runs())
-    assert found.verdict == "depends"
-    assert [where for where, holds in found.holds.items() if holds] == [
-        "varga7-slow, 10, position",
-        "varga7-slow, 50, position",
-        "varga7-slow, 50, orientation",
-        "varga7-fast, 50, position",
-    ]
-    np.testing.assert_allclose(found.figures["[mm]"], [1.7, 1.77, 157.0, 35.1], rtol=0.01)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from stable_baselines3 import A2C, DDPG, PPO, SAC, TD3
+from stable_baselines3 import A2C, PPO, SAC, TD3
 from torch import nn
 
 import baselines
@@ -15,15 +15,12 @@ from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 
 TRACK = "ikgym/Track-v0"
-LARGE = {"net_arch": [256, 256], "activation_fn": nn.ReLU}
 MODELS = {
     "ppo": (PPO, {"n_steps": 8, "batch_size": 16}),
-    "ppo, 256, ReLU": (PPO, {"n_steps": 8, "batch_size": 16, "policy_kwargs": LARGE}),
     "a2c, silu": (A2C, {"policy_kwargs": {"activation_fn": nn.SiLU, "net_arch": [5]}}),
     "sac": (SAC, {}),
     "sac, gSDE": (SAC, {"use_sde": True}),
     "td3": (TD3, {"policy_kwargs": {"net_arch": [6, 5, 4]}}),
-    "ddpg": (DDPG, {}),
 }
 
 

@@ -1,26 +1,128 @@
-"""The folder of a run: what is resumed, replaced and refused."""
+"""Runs of apg: a segment depends on state and number alone, runs are resumed, replaced and refused."""
 
 import io
+import multiprocessing
+import time
 
 import numpy as np
 import pytest
 import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+import baselines
+from baselines.episodes import rollouts
 from baselines.files import ResultsError
-from baselines.training import folder as folder_module
 from baselines.training import run as run_module
 from baselines.training.config import TrainingError
-from baselines.training.folder import FORMAT, MAGIC
-from baselines.training.run import train
-from tests.baselines.training.small import about, timeless, tiny
+from baselines.training.folder import FORMAT
+from baselines.training.randomness import deterministic_torch
+from baselines.training.run import train, weights_hash
+from baselines.training.validation import validation_seeds
+from tests.baselines.training.small import about, play_segments, timeless, tiny, trainer_of
 
 CONFIG = tiny()
+#: Processes begin at once: their server has loaded all that a run needs.
+FORK = multiprocessing.get_context("forkserver")
+FORK.set_forkserver_preload(["baselines.training.run"])
+
+CASES = {
+    "plain": CONFIG,
+    "damped": tiny(damping=4e-4),
+    "skew, end within a segment": tiny(task="skew", steps=20),
+    "held for longer than it sees": tiny(offsets=(1, 2)),
+}
+
+
+@pytest.mark.parametrize("config", CASES.values(), ids=CASES)
+def test_a_segment_depends_on_state_and_number(config, tmp_path):
+    with deterministic_torch():
+        undisturbed = trainer_of(config)
+        before = weights_hash(undisturbed.policy)
+        play_segments(undisturbed, [0])
+        torch.save(undisturbed.state(), tmp_path / "state.pt")
+        wanted = play_segments(undisturbed, [1, 2])
+        other = trainer_of(config)
+        other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
+        assert play_segments(other, [1, 2]) == wanted
+    assert weights_hash(other.policy) == weights_hash(undisturbed.policy) != before
+    assert other.steps == undisturbed.steps > 0
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
+    """The folder of a run from beginning to end, and its result."""
     folder = tmp_path_factory.mktemp("apg")
     return folder, train(CONFIG, 3, folder)
+
+
+def assert_same_run(folder, other):
+    assert about(other)["weights_sha256"] == about(folder)["weights_sha256"]
+    assert about(other)["kept"] == about(folder)["kept"]
+    assert timeless(other) == timeless(folder)
+
+
+def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
+    """Also if it was stopped some segments after its last checkpoint; TensorBoard has each step once."""
+    folder, result = finished
+
+    def stop(done, score):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(CONFIG, 3, tmp_path, checkpoint_every=1e9, on_segment=stop)
+    assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
+    assert not (tmp_path / "agent.safetensors").exists()
+    time.sleep(1.0 - time.time() % 1.0)  # TensorBoard orders files by the second of their beginning
+    assert train(CONFIG, 3, tmp_path, resume=True) == type(result)(tmp_path, result.weights_sha256, result.score)
+    assert_same_run(folder, tmp_path)
+    for each in (folder, tmp_path):
+        events = EventAccumulator(str(each / "tensorboard")).Reload()
+        steps = [row["steps"] for row in timeless(folder) if "validation" in row]
+        assert [event.step for event in events.Scalars("validation/cost")] == steps
+
+
+def test_run_json(finished):
+    folder, result = finished
+    content = about(folder)
+    assert (content["status"], content["method"]) == ("finished", CONFIG.method)
+    assert type(CONFIG).from_json(content["config"]) == CONFIG
+    assert content["weights_sha256"] == result.weights_sha256
+    assert content["training"]["segments"] == 3
+    assert content["training"]["steps"] == timeless(folder)[-1]["steps"] > 0
+    assert {"torch", "stable_baselines3", "numpy", "ikgym"} <= content["versions"].keys()
+    assert [row["segment"] for row in content["validation"]] == [0, 2, 3]
+    costs = [row["cost"] for row in content["validation"]]
+    assert content["kept"]["segment"] == content["validation"][int(np.argmin(costs))]["segment"]
+    assert content["kept"]["validation"]["cost"] == min(costs) == result.score.cost
+
+
+def test_the_agent_plays_as_in_validation(finished):
+    folder, result = finished
+    scenario = CONFIG.make_scenario()
+    policy = baselines.make("agent", scenario, path=str(folder / "agent.safetensors"))
+    episodes = rollouts(scenario, policy, validation_seeds(scenario, CONFIG.validation_episodes))
+    costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
+    assert np.exp(np.mean(np.log(costs))) == pytest.approx(result.score.cost, rel=1e-12)
+
+
+@pytest.mark.slow  # those stopped in this process, above and below, always run
+def test_killed_at_random_moments(tmp_path):
+    """While it is trained: from the time on at which its folder is there."""
+    config, rng = tiny(segments=8, evaluate_every=4), np.random.default_rng()
+    begin = time.monotonic()
+    train(config, 3, tmp_path / "undisturbed")
+    longest, folder = time.monotonic() - begin, tmp_path / "killed"
+    for _ in range(3):
+        process = FORK.Process(target=train, args=(config, 3, folder), kwargs={"resume": True}, daemon=True)
+        process.start()
+        while process.is_alive() and not (folder / "run.json").exists():
+            time.sleep(0.01)
+        process.join(longest * rng.random())
+        process.kill()
+        process.join()
+    train(config, 3, folder, resume=True)
+    assert_same_run(tmp_path / "undisturbed", folder)
 
 
 def copied(folder, path):
@@ -94,11 +196,11 @@ def test_another_run_is_not_resumed(finished, monkeypatch):
         train(CONFIG, 3, finished[0], resume=True)
 
 
-def sealed(content):
-    """A checkpoint with the right digest and any content."""
+def saved(content):
+    """A checkpoint with any content."""
     stream = io.BytesIO()
     torch.save(content, stream)
-    return folder_module.sealed(stream.getvalue())
+    return stream.getvalue()
 
 
 class Evil:
@@ -111,9 +213,9 @@ class Evil:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
-        ("checkpoint.pt", sealed({"format": 99}), "it has another format"),
-        ("checkpoint.pt", sealed({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
+        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged"),
+        ("checkpoint.pt", saved({"format": 99}), "it has another format"),
+        ("checkpoint.pt", saved({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
         ("run.json", b"{", "run.json is damaged"),
         ("run.json", b'{"format": 2}', f"differs in format \\(2 there, {FORMAT} here\\)"),
     ],
@@ -122,16 +224,6 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ResultsError, match=message):
-        train(CONFIG, 3, tmp_path, resume=True)
-
-
-def test_a_flipped_byte_of_a_checkpoint_is_noticed(finished, tmp_path):
-    """PyTorch would read it without an error."""
-    damaged = bytearray((finished[0] / "checkpoint.pt").read_bytes())
-    damaged[np.random.default_rng().integers(len(MAGIC) + 65, len(damaged))] ^= 64
-    copied(finished[0], tmp_path)
-    (tmp_path / "checkpoint.pt").write_bytes(damaged)
-    with pytest.raises(ResultsError, match="it is damaged: expected the SHA-256"):
         train(CONFIG, 3, tmp_path, resume=True)
 
 
