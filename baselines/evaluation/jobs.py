@@ -71,8 +71,6 @@ class Options:
     """Continue with the results in the folder: finished episodes are not played again."""
     overwrite: bool = False
     """Replace the results in the folder."""
-    plots: bool = False
-    """Draw plots as PNG files into the folder: errors, joint motion, cost against time. report.html has its own."""
     report: bool = True
     """Write report.html into the folder: table, plots and replays in one page that opens without a network."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()

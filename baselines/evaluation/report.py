@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import datetime
-import pathlib
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-from urllib.parse import quote
 
 from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
@@ -19,10 +17,6 @@ from baselines.statistics import Spread
 
 #: Characters that a line of the printed tables may have.
 WIDTH = 120
-#: The plots of a scenario: captions and files, relative to the folder, by the group they are shown in.
-Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
-#: The group of plots that show all policies.
-OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
 STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
@@ -139,7 +133,6 @@ def readme(
     *,
     command: str,
     date: datetime.datetime,
-    pictures: Mapping[str, Pictures] | None = None,
 ) -> str:
     """The README of a folder of results, in Markdown.
 
@@ -148,7 +141,6 @@ def readme(
         skipped: Policies that were skipped.
         command: The command of the evaluation.
         date: When it finished.
-        pictures: The plots of each scenario.
     """
     out = ["# Results", ""]
     parameters = ["| scenario | policy | parameters |", "|---|---|---|"]
@@ -156,13 +148,6 @@ def readme(
         out += [f"## {escaped(heading(scenario, summaries))}", "", markdown(COLUMNS, summaries), ""]
         if spread := _spread(summaries):
             out += [f"{_score(summaries).capitalize()} over the episodes:", "", markdown(spread, summaries), ""]
-        for group, files in (pictures or {}).get(scenario, {}).items():
-            # The plots of single policies are many: collapsed, so that the tables stay together.
-            collapsed = group != OVERVIEW
-            out += ["<details>", f"<summary>{group}</summary>", ""] if collapsed else []
-            for caption, file in files:
-                out += [f"![{escaped(caption)}]({quote(file.as_posix())})", "", f"*{escaped(caption)}.*", ""]
-            out += ["</details>", ""] if collapsed else []
         for one in summaries:
             values = ", ".join(code(f"{name}={value}") for name, value in one.first.parameters.items()) or NOTHING
             values = values.replace("|", "\\|")  # nothing else has a meaning in code

@@ -41,7 +41,7 @@ COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 #: The report of a folder.
 PAGE = "report.html"
 #: Files of a folder that are replaced by --overwrite; other files are left alone.
-WRITTEN = ("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz", "plots/*/*.png")
+WRITTEN = ("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz")
 
 
 class Rows(list[Row]):

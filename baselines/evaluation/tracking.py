@@ -132,7 +132,7 @@ class Tracking:
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
-        return picture.draw(f"{self.scenario}: {self.policy}", [(self.policy, trajectory_log(*self._played))])
+        return picture.draw(f"{self.scenario}: {self.policy}", trajectory_log(*self._played))
 
 
 def track(

@@ -60,7 +60,7 @@ def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
 #: Processes of this machine, or a cluster.
 ONE_KIND = Rule(("--workers",), lambda given: given.cluster is None, "with --cluster")
 RULES = (
-    Rule(("--resume", "--overwrite", "--plots", "--report"), lambda given: given.out is not None, "without --out"),
+    Rule(("--resume", "--overwrite", "--report"), lambda given: given.out is not None, "without --out"),
     Rule(
         ("--episodes", "--split", "--steps", "--noise-seeds"),
         lambda given: not given.test_sets,
@@ -102,7 +102,6 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   results.csv   the same as a table
   README.md     tables and conditions
   report.html   a table that sorts and filters, plots, and replays of the arms: open it in a browser
-  plots/        with --plots, for each scenario: errors and position, joint motion, cost against time
   series/       the data of the plots, as .npz
   export/       with --export, the joint motion of each episode
 

@@ -35,9 +35,6 @@ class Options(Arguments):
     """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 2
     """Episodes of each policy that are played alone and timed."""
-    plots: bool = False
-    """Draw the plots of evaluate, too."""
-
     fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"test_sets": (MAIN,)}
 
 

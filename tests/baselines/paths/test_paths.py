@@ -71,6 +71,7 @@ def test_a_start_that_is_given_is_kept_where_it_will_do():
 
 def test_a_path_out_of_reach():
     found = survey(ikgym.scenarios.get("panda-edge"))
+    assert all(branch.contact is None for branch in found.branches)  # without collisions
     assert not found.best.whole
     assert 0.3 < found.best.reached < 0.5
     # The farthest point of the circle is 4 % of the reach out of reach.

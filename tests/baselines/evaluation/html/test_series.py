@@ -36,14 +36,13 @@ def log():
     return log_of(limited(steps=1000, dt=0.001))
 
 
-@pytest.mark.parametrize("rows", [1, 2, 399, 400, 401, 1000, 6283])
-def test_frames_are_spread_evenly_and_end_with_the_last_row(rows):
-    frames = frame_rows(rows, FRAMES)
-    assert len(frames) == min(rows, FRAMES)
-    assert frames[-1] == rows - 1
-    gaps = np.diff(frames, prepend=-1)
-    assert gaps.min() >= 1
-    assert gaps.max() - gaps.min() <= 1
+def test_frames_are_spread_evenly_and_end_with_the_last_row():
+    for rows in (1, 2, 399, 400, 401, 6283):
+        frames = frame_rows(rows, FRAMES)
+        assert len(frames) == min(rows, FRAMES)
+        assert frames[-1] == rows - 1
+        gaps = np.diff(frames, prepend=-1)
+        assert 1 <= gaps.min() <= gaps.max() <= gaps.min() + 1
 
 
 @pytest.mark.parametrize("name", ["panda-field", "panda-payload", "varga7-pose-random"])
@@ -106,10 +105,3 @@ def test_limits_tell_the_most_severe():
     assert limits(log).tolist() == [[FREE, STOP, STOP, VELOCITY, ACCELERATION]]
     without = {"lower": np.full(5, -np.inf), "upper": np.full(5, np.inf), "velocity_limit": np.full(5, np.inf)}
     assert limits({**log, **without, "acceleration_limit": np.full(5, np.inf)}).tolist() == [[FREE] * 5]
-
-
-def test_logs_without_pictures_have_curves(log):
-    before = {name: values for name, values in log.items() if name not in ("frame", "joint_points", "tool_rotation")}
-    series = thinned(before, BUDGET)
-    assert "points" not in series["arrays"]
-    assert series["arrays"]["q"] == thinned(log, BUDGET)["arrays"]["q"]
