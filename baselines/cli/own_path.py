@@ -47,13 +47,7 @@ RULES = (Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), 
 
 
 def scenario_of(options: OwnPath) -> Scenario:
-    """The scenario that the options mean, over its whole path where they name a CSV file.
-
-    Raises:
-        UnknownNameError: There is no such scenario, arm, link or task.
-        InvalidInputError: A file cannot be read, or an option is missing or wrong.
-        MissingDependencyError: A URDF file is named, and Pinocchio is not installed.
-    """
+    """The scenario that the options mean, over its whole path where they name a CSV file."""
     if options.file.endswith(".csv"):
         return _from_csv(options)
     scenario = scenarios.find(options.file)

@@ -152,11 +152,7 @@ class Job:
         return metrics.key(self.scenario.name, self.policy, self.parameters, self.seeds, self.scenario.steps)
 
     def bind(self) -> Policy:
-        """The policy.
-
-        Raises:
-            ResultsError: The file behind the policy has changed since the evaluation began.
-        """
+        """The policy; refused if the file behind it has changed since the evaluation began."""
         policy = self.specification.bind(self.scenario, self.given, self.preview)
         now = self.specification.parameters(self.scenario, policy)
         if now != self.parameters:

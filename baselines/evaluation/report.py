@@ -104,13 +104,7 @@ COLUMNS = (
 
 
 def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
-    """The tables of all scenarios as plain text.
-
-    Args:
-        rows: The results.
-        skipped: Policies that were skipped, named below the tables.
-        width: Characters that a line may have. Columns that do not fit are left out, and named below.
-    """
+    """The tables of all scenarios as plain text; notes name skipped policies, and columns that do not fit the width."""
     parts: list[str] = []
     absent: dict[str, None] = {}
     for scenario, summaries in by_scenario(rows).items():
@@ -134,14 +128,7 @@ def readme(
     command: str,
     date: datetime.datetime,
 ) -> str:
-    """The README of a folder of results, in Markdown.
-
-    Args:
-        rows: The results.
-        skipped: Policies that were skipped.
-        command: The command of the evaluation.
-        date: When it finished.
-    """
+    """The README of a folder of results, in Markdown."""
     out = ["# Results", ""]
     parameters = ["| scenario | policy | parameters |", "|---|---|---|"]
     for scenario, summaries in by_scenario(rows).items():

@@ -69,13 +69,7 @@ def carry_out(
     command: str = "baselines.evaluate.evaluate(…)",
     show: Callable[[Rows], None] | None = None,
 ) -> Rows:
-    """See :func:`evaluate`.
-
-    Args:
-        options: All options.
-        command: The command, for the files.
-        show: Called with the rows before the report is written.
-    """
+    """See :func:`evaluate`. The files state the command; `show` is called with the rows before they are written."""
     jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
     workers.check()

@@ -83,13 +83,7 @@ def filled(columns: Iterable[Column], summaries: Sequence[Summary]) -> list[Colu
 
 
 def plain(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> str:
-    """A table as plain text.
-
-    Args:
-        columns: Its columns, the first one the names of the policies; empty ones are left out, as in all tables.
-        summaries: Its lines.
-        width: Characters that a line may have; columns stand closer together if they would not fit.
-    """
+    """A table as plain text: policies first, columns closer together if they would not fit, empty ones left out."""
     columns = filled(columns, summaries)
     heads = [[column.title for column in columns], [column.unit for column in columns]]
     heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in summaries]
@@ -165,12 +159,6 @@ def code(text: str) -> str:
 
 
 def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:
-    """A Markdown table of cells.
-
-    Args:
-        head: The names of the columns.
-        lines: The cells.
-        text: Numbers of the columns that are aligned to the left.
-    """
+    """A Markdown table of cells; the columns whose numbers are in `text` are aligned to the left."""
     rules = [":--" if column in text else "--:" for column in range(len(head))]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, rules, *lines))

@@ -88,12 +88,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> TestSet:
-    """The test set of a name.
-
-    Raises:
-        UnknownNameError: There is no such set.
-        InvalidInputError: Its scenario, its seeds or the cost have changed.
-    """
+    """The test set of a name; refused if its scenario, its seeds or the cost have changed."""
     if name not in SETS:
         raise UnknownNameError("test set", name, SETS)
     found = SETS[name]

@@ -53,11 +53,7 @@ class Motion:
 
 
 def path_duration(scenario: Scenario) -> float:
-    """The time that the path takes, or the episode where the path goes on for ever, in [s].
-
-    Raises:
-        InvalidInputError: The path differs from reset to reset.
-    """
+    """The time that the path takes, or the episode where the path goes on for ever, in [s]."""
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     ends = duration(scenario.trajectory)
@@ -85,12 +81,7 @@ def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> d
 
 
 def played(scenario: Scenario, starts: FloatArray) -> Motion:
-    """`qp` on a scenario; where it has collisions, the starts have to be clear.
-
-    Args:
-        scenario: A result of :func:`ideal`.
-        starts: Joint coordinates in [rad] or [m]. Shape (N, n).
-    """
+    """`qp` on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, starts must be clear."""
     policy, rows = registry.make("qp", scenario), len(starts)
     simulator = Simulator(scenario, rows, policy.preview)
     simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(0)[0]] * rows, starts)

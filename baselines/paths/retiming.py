@@ -76,12 +76,7 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False) -> Retimed:
 
 
 def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
-    """The result of :func:`retime`; None where no start leads along the whole path, or `qp` follows from none.
-
-    Args:
-        found: The survey of the path.
-        fastest: See :func:`retime`.
-    """
+    """The result of :func:`retime`; None where no start leads along the whole path, or `qp` follows from none."""
     for errors in (FOLLOWED, REACHED):
         best = _best(found, errors, fastest)
         if best is not None:

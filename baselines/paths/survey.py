@@ -205,13 +205,7 @@ def _shares(motion: Motion) -> FloatArray:
 
 
 def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
-    """A branch from the motion of one start.
-
-    Args:
-        scenario: The scenario.
-        motion: Played in the timing.
-        timing: The timing.
-    """
+    """A branch from the motion of one start, played in the timing."""
     q, dt, arm = motion.q[:, 0], motion.times[1], scenario.arm
     slowing = timing.duration / float(timing.progress[-1])
     moving = q[int(SETTLED / dt) if slowing > 1.0 else 0 :]

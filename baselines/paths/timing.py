@@ -93,12 +93,7 @@ class Timing:
 
 
 def shortest(path: JointPath, limits: Limits) -> Timing | None:
-    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still.
-
-    Args:
-        path: The path.
-        limits: What holds.
-    """
+    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still."""
     import toppra
 
     logging.getLogger("toppra").setLevel(logging.ERROR)

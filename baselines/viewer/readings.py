@@ -42,12 +42,7 @@ class Reading(NamedTuple):
 
 
 class Reader:
-    """Computes the readings of one arm.
-
-    Args:
-        arm: The arm.
-        task: The task, which selects rows of the Jacobian.
-    """
+    """Computes the readings of one arm; the task selects rows of the Jacobian."""
 
     def __init__(self, arm: Arm, task: Task) -> None:
         self._arm, self._rows = arm, 6 if task.has_orientation and arm.joints >= 6 else 3
@@ -74,10 +69,9 @@ class Reader:
 
 
 def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
-    """The range of the sliders: the joint limits; half a turn either way, or half the reach, without limits.
+    """Lowest and highest joint coordinates of the sliders, each of shape (n,): the joint limits.
 
-    Returns:
-        Lowest and highest joint coordinates in [rad] or [m], each of shape (n,).
+    Without limits half a turn either way, or half the reach.
     """
     usual = np.where(arm.prismatic, 0.5 * (arm.reach(np.zeros(arm.joints)) or 1.0), np.pi)
     return (

@@ -58,17 +58,7 @@ class Stage:
 
     @classmethod
     def of(cls, scenario: str | Scenario, seed: int = 0, steps: int | None = None) -> Stage:
-        """An episode of a scenario.
-
-        Args:
-            scenario: As :func:`ikgym.scenarios.find` takes it.
-            seed: The reset seed.
-            steps: Most steps; the scenario's own if left out.
-
-        Raises:
-            UnknownNameError: There is no such scenario.
-            InvalidInputError: The seed or the number of steps is not valid.
-        """
+        """An episode of a scenario as :func:`ikgym.scenarios.find` takes it; all of its steps if they are left out."""
         whole = shown = scenarios.find(scenario)
         if steps is not None:
             shown = whole.replace(steps=min(whole_number("steps", steps, at_least=1), whole.steps))
@@ -124,12 +114,7 @@ class Replay(NamedTuple):
 
 
 def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
-    """Plays the episode with each policy once, with a bar on a terminal.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: There is no policy, one does not suit the scenario, or a parameter is refused.
-    """
+    """Plays the episode with each policy once, with a bar on a terminal."""
     if not policies:
         raise InvalidInputError("policy: expected at least one, got none.")
     wanted, replays = list(dict.fromkeys(policies)), []

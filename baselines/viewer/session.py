@@ -57,16 +57,7 @@ class Shown(NamedTuple):
 
 
 class Session:
-    """The state of the viewer; all policies play the episode when it is made.
-
-    Args:
-        stage: The episode.
-        policies: Names of policies, as the command line takes them.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: There is no policy, or one does not suit the scenario.
-    """
+    """The state of the viewer; all policies, named as on the command line, play the episode when it is made."""
 
     def __init__(self, stage: Stage, policies: Sequence[str]) -> None:
         self.stage, self.replays = stage, play_all(stage, policies)

@@ -44,11 +44,7 @@ class Arguments(Options):
                 object.__setattr__(self, name, value)
 
     def played(self) -> list[Scenario]:
-        """The scenarios, those of test sets included.
-
-        Raises:
-            UnknownNameError: There is no such scenario or test set.
-        """
+        """The scenarios, those of test sets included."""
         names = scenarios.names() if "all" in self.scenarios else self.scenarios
         return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in self.test_sets)]
 
@@ -119,14 +115,7 @@ def _columns() -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     program = shell.program("evaluate", "python -m baselines.evaluate")
     return shell.run_resumable(Arguments, arguments, program, manual, _work, RULES)
 

@@ -55,19 +55,7 @@ Files in DIR, besides those of evaluate:
 
 
 def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
-    """Writes the table and the plots.
-
-    Args:
-        rows: The results.
-        policies: The policies as text.
-        out: The folder.
-
-    Returns:
-        The table, as Markdown.
-
-    Raises:
-        ResultsError: The folder cannot be written.
-    """
+    """Writes the table and the plots into a folder; returns the table, as Markdown."""
     from baselines.evaluation.plots import comparison
     from baselines.evaluation.plots.style import png
 

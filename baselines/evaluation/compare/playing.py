@@ -44,11 +44,7 @@ class Comparison:
     notes: Sequence[str]
 
     def table(self, width: int = report.WIDTH) -> str:
-        """Table, notes and recommendation as plain text.
-
-        Args:
-            width: Characters that a line may have. Columns that decide nothing are left out where they do not fit.
-        """
+        """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""
         follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
         lines = summarise(self.rows)
         columns = fitting((*COLUMNS, follows), lines, width)

@@ -44,12 +44,7 @@ class Recommendation:
 
 
 def fault(row: Row, dt: float) -> str:
-    """Why a solver does not follow a path; empty where it does.
-
-    Args:
-        row: Its row.
-        dt: The control period in [s].
-    """
+    """Why the solver of a row does not follow a path with the control period dt in [s]; empty where it does."""
     if not row.followed:
         turned = row.orientation_error_max
         return f"errs by {1e3 * row.position_error_max:.3g} mm" + (f", {1e3 * turned:.3g} mrad" if turned else "")

@@ -39,13 +39,7 @@ class Motion(NamedTuple):
 
 
 def by_joint(arm: Arm, values: FloatArray, per: str = "") -> dict[str, FloatArray]:
-    """Columns of a table, named by joint and unit.
-
-    Args:
-        arm: The arm.
-        values: One column a joint. Shape (k, n).
-        per: Follows the unit of the joint coordinate, such as ``/s``.
-    """
+    """Columns of a table by joint and unit, of values (k, n); `per` follows the unit of the joint, such as ``/s``."""
     units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
     heads = [f"{name} [{unit}{per}]" for name, unit in zip(arm.joint_names, units, strict=True)]
     return dict(zip(heads, values.T, strict=True))

@@ -27,12 +27,7 @@ LETTERS, LINE = 115, 10  # small ones that fit the width, and those that a legen
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure, without pyplot, which needs a window system and keeps figures alive.
-
-    Args:
-        height: In [in].
-        width: In [in].
-    """
+    """An empty figure in [in], without pyplot, which needs a window system and keeps figures alive."""
     out = Figure(figsize=(width, height), dpi=DPI, layout=ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06))
     FigureCanvasAgg(out)
     return out
