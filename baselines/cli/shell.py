@@ -12,7 +12,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 import tyro
@@ -27,33 +27,13 @@ CONSOLE = "ikgym"
 
 #: The extra that installs a package.
 EXTRAS = {
-    "torch": "train",
-    "stable_baselines3": "train",
-    "sb3_contrib": "train",
-    "tensorboard": "train",
-    "rich": "train",
-    "optuna": "train",
-    "yaml": "train",
-    "h5py": "data",
-    "minari": "data",
-    "pinocchio": "urdf",
-    "toppra": "paths",
-    "moviepy": "video",
-    "ray": "cluster",
-    "trimesh": "view",
-    "viser": "view",
-    "yourdfpy": "view",
+    **dict.fromkeys(("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "rich", "optuna", "yaml"), "train"),
+    **dict.fromkeys(("trimesh", "viser", "yourdfpy"), "view"),
+    **{"h5py": "data", "minari": "data", "pinocchio": "urdf", "toppra": "paths", "moviepy": "video", "ray": "cluster"},
 }
 
 
-class Resumable(Protocol):
-    """The options of a command that writes into a folder, and continues there with ``--resume``."""
-
-    @property
-    def out(self) -> pathlib.Path | None: ...  # noqa: D102
-
-
-P = TypeVar("P", bound=Resumable)
+P = TypeVar("P")
 
 
 def program(name: str, otherwise: str) -> str:
@@ -105,7 +85,7 @@ def run_resumable(
     def both() -> int:
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
-        out = options.out
+        out = getattr(options, "out")  # noqa: B009  # a folder, or None
         for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
             if (value := getattr(options, name, None)) is not None:
                 whole_number(name, value, at_least=1, at_most=most)

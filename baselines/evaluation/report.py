@@ -39,17 +39,16 @@ RATIO = Column(
     lambda s: s.cost_ratio and s.cost_ratio.mean,
     about="total cost / best known cost, geometric mean over the episodes",
 )
+
+
+def _largest(column: str, title: str, unit: str, about: str, scale: float = 1.0, drop: int = 0) -> Column:
+    return Column(title, unit, lambda s: s.largest(column), scale, about=about, drop=drop)
+
+
 ERRORS = (
-    Column("pos max", "[mm]", lambda s: s.largest("position_error_max"), 1e3, about="largest position error"),
-    Column(
-        "ori max",
-        "[mrad]",
-        lambda s: s.largest("orientation_error_max"),
-        1e3,
-        about="largest orientation error",
-        drop=1,
-    ),
-    Column("q̇ peak", "", lambda s: s.largest("qdot_peak"), about="largest joint velocity, in rad/s or m/s", drop=2),
+    _largest("position_error_max", "pos max", "[mm]", "largest position error", 1e3),
+    _largest("orientation_error_max", "ori max", "[mrad]", "largest orientation error", 1e3, drop=1),
+    _largest("qdot_peak", "q̇ peak", "", "largest joint velocity, in rad/s or m/s", drop=2),
     Column(
         "q̈ peak",
         "",
@@ -61,17 +60,17 @@ ERRORS = (
 )
 TIMES = (
     Column("p50", "[µs]", lambda s: s.median("time_p50_us"), about="median time of a call after the first"),
-    Column("p99", "[µs]", lambda s: s.largest("time_p99_us"), about="99th percentile of these times", drop=5),
+    _largest("time_p99_us", "p99", "[µs]", "99th percentile of these times", drop=5),
     Column("misses", "", lambda s: s.total("deadline_misses"), about="such calls longer than Δt", drop=6),
 )
 PATH = (
     Column("path time", "[s]", lambda s: s.path_time, about="when the end of the path was reached, with free timing"),
-    Column(
+    _largest(
+        "path_position_error",
         "path err",
         "[mm]",
-        lambda s: s.largest("path_position_error"),
+        "largest distance from the reference at the policy's own progress, with free timing",
         1e3,
-        about="largest distance from the reference at the policy's own progress, with free timing",
     ),
 )
 CONTACTS = (

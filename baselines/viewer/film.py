@@ -33,17 +33,12 @@ def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
     `speed` is how many seconds of the episode one second of the video shows.
     """
     steps = stage.scenario.steps
-    between = number("speed", speed, above=0.0) / checked_fps(fps) / stage.scenario.dt
+    between = number("speed", speed, above=0.0) / number("fps", fps, at_least=0.1, at_most=1000.0) / stage.scenario.dt
     if steps > MOST_PICTURES * between:
         raise InvalidInputError(
             f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {speed:g}."
         )
     return np.append(np.rint(np.arange(0.0, steps, between)), steps).astype(np.int64)
-
-
-def checked_fps(fps: float) -> float:
-    """Pictures a second."""
-    return number("fps", fps, at_least=0.1, at_most=1000.0)
 
 
 def checked_width(width: int) -> int:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -161,56 +159,44 @@ def test_lists_are_complete_and_fit_and_every_member_is_shown_in_full(word, name
     assert max(map(len, text.splitlines())) <= 82
 
 
-def test_a_policy_is_shown_with_its_parameters(capsys):
-    assert main(["policies", "dls"]) == 0
-    text = capsys.readouterr().out
-    assert "Minimises" in text
+def test_members_are_shown_and_files_like_members(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def shown(*words):
+        assert main(words) == 0
+        return capsys.readouterr().out
+
+    text = shown("policies", "dls")
     assert "    damping: λ, added to J Jᵀ as it is" in text
     assert text.endswith("Defaults:\n  gain = 1.0\n  damping = 0.001\n")
-
-
-def test_an_arm_and_a_scenario_are_shown(capsys):
-    assert main(["arms", "varga7"]) == 0
-    text = capsys.readouterr().out
+    text = shown("arms", "varga7")
     assert "varga7: 7 joints, tool at (5.5, 0, 2) m where q = 0, home posture none stated" in text
     assert re.search(r"^joint_3 +prismatic +none +none +none +none$", text, re.MULTILINE)
-    assert main(["scenarios", "varga7-fast"]) == 0
-    assert "varga7-fast: 3000 steps of 0.001 s" in capsys.readouterr().out
+    assert "bodies" not in text
+    ikgym.scenarios.get("panda-edge").replace(name="mine", source="").save("mine.toml")
+    assert shown("arms", "mine.toml").startswith("mine.toml: 7 joints")
+    text = shown("scenarios", "mine.toml")
+    assert text.startswith("mine: 3600 steps of 0.001 s\n\n  arm  ")
+    assert re.search(r"^  path takes +3\.5\d* s, the episode 3\.6 s$", text, re.MULTILINE)
+    assert re.search(r"^  poses in reach +not all: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
+    assert "all, taken one by one; ikgym path follows them from the start" in shown("scenarios", "panda-line")
+    assert "poses in reach" not in shown("scenarios", "panda-random")
 
 
 def test_bodies_and_obstacles_are_listed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     crowd().save("mine.toml")
-    assert main(["arms", "panda"]) == 0
+    assert main(["arms", "panda"]) == main(["scenarios", "mine.toml"]) == 0
     text = capsys.readouterr().out
-    assert re.search(r"^moved by +bodies; \d+ pairs of them can meet$", text, re.MULTILINE)
-    assert re.search(r"^the base +link0 \(capsule of 0\.\d+ m, radius 0\.\d+ m\)$", text, re.MULTILINE)
-    assert main(["scenarios", "mine.toml"]) == 0
-    text = capsys.readouterr().out
-    for kind, names in (("half space", "floor"), ("box", "box"), ("sphere", r"ball \(moves\)"), ("capsule", "pipe")):
-        assert re.search(f"^  {kind} +{names}$", text, re.MULTILINE)
-    assert re.search(r"^  bodies +\d+ on the arm, \d+ pairs of which can meet$", text, re.MULTILINE)
+    for line in (
+        r"moved by +bodies; \d+ pairs of them can meet",
+        r"the base +link0 \(capsule of 0\.\d+ m, radius 0\.\d+ m\)",
+        r"  half space +floor",
+        r"  sphere +ball \(moves\)",
+        r"  bodies +\d+ on the arm, \d+ pairs of which can meet",
+    ):
+        assert re.search(f"^{line}$", text, re.MULTILINE)
     assert "an arm that touches something is stopped" in text
-    assert main(["arms", "varga7"]) == main(["scenarios", "varga7-fast"]) == 0
-    text = capsys.readouterr().out
-    assert "bodies" not in text
-    assert "collisions" not in text
-
-
-def test_files_are_shown_like_members(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    ikgym.scenarios.get("panda-edge").replace(name="mine", source="").save("mine.toml")
-    assert main(["arms", "mine.toml"]) == 0
-    assert capsys.readouterr().out.startswith("mine.toml: 7 joints")
-    assert main(["scenarios", "mine.toml"]) == 0
-    text = capsys.readouterr().out
-    assert text.startswith("mine: 3600 steps of 0.001 s\n\n  arm  ")
-    assert re.search(r"^  path takes +3\.5\d* s, the episode 3\.6 s$", text, re.MULTILINE)
-    assert re.search(r"^  poses in reach +not all: missed from 1\.\d+ s to 2\.\d+ s, at \(0\.8", text, re.MULTILINE)
-    assert main(["scenarios", "panda-line"]) == 0
-    assert "all, taken one by one; ikgym path follows them from the start" in capsys.readouterr().out
-    assert main(["scenarios", "panda-random"]) == 0
-    assert "poses in reach" not in capsys.readouterr().out
 
 
 def test_the_table_fits_the_terminal_and_the_readme_has_the_command(tmp_path, capsys):
@@ -220,18 +206,3 @@ def test_the_table_fits_the_terminal_and_the_readme_has_the_command(tmp_path, ca
     assert "left out at 80 characters a line: p99, misses" in printed.out
     assert max(map(len, printed.out.split("\n\nwritten to")[0].splitlines())) <= 80
     assert "ikgym evaluate --policies dls --steps 5" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
-
-
-def test_training_without_its_extra_says_which(tmp_path):
-    """Also by `train.py`, which is the same command."""
-    (tmp_path / "torch.py").write_text("raise ModuleNotFoundError('no', name='torch')\n")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "train.py"), "ppo", "--env", "ikgym/Track-v0", "--out", str(tmp_path)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stderr == 'error: This needs torch: pip install "ikgym[train]"\n'

@@ -24,6 +24,7 @@ from tests.baselines.evaluation.planning import planned
 ROOT = pathlib.Path(__file__).parents[3]
 STEPS = 15
 SET = {"test_sets": "varga7-random"}
+FAST = ikgym.scenarios.get("varga7-fast")
 
 
 def timeless(rows):
@@ -118,17 +119,12 @@ def test_policies_are_parsed_and_text_is_never_run():
         ("varga7-fast", "dls", SET, InvalidInputError, "A test set defines what is played"),
         ((), "dls", {**SET, "episodes": 2}, InvalidInputError, "A test set defines what is played"),
         ([], "dls", {}, InvalidInputError, "Nothing to evaluate"),
+        ([FAST, FAST.replace(dt=2e-3)], "dls", {}, InvalidInputError, "Two different scenarios are called"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused(scenarios, policies, options, error, message):
     with pytest.raises(error, match=message):
         evaluate(scenarios, policies, **options)
-
-
-def test_two_scenarios_of_one_name_are_refused():
-    fast = ikgym.scenarios.get("varga7-fast")
-    with pytest.raises(InvalidInputError, match="Two different scenarios are called 'varga7-fast'"):
-        evaluate([fast, fast.replace(dt=2e-3)], "dls")
 
 
 # Batches
@@ -142,11 +138,6 @@ def test_episodes_of_a_policy_in_a_scenario_are_played_together():
     assert [part[0].timed for part in parts] == [True, True, False, False] * 2 + [True, True]
     for part in parts:
         assert len({(job.scenario.name, job.policy, str(job.parameters)) for job in part}) == 1
-
-
-def test_a_reference_that_knows_one_episode_plays_it_alone():
-    jobs = planned("varga7-random", "follow_nominal", episodes=4).jobs
-    assert [len(batch) for batch in batches(jobs)] == [1] * 4
 
 
 def test_what_is_timed_changes_nothing_but_the_times():
@@ -224,17 +215,6 @@ def test_series_are_the_trajectory_log_of_the_first_episode_at_the_steps_that_co
     assert series["position_error"].max() == row.position_error_max
     assert series["pose"].shape == series["nominal"].shape == (12, 12)
     assert series["q"].shape == series["nominal_q"].shape == (12, 8)
-
-
-def test_results_are_never_overwritten_in_silence(tmp_path):
-    given = {"scenarios": "varga7-fast", "policies": "dls", "steps": 3, "out": tmp_path}
-    evaluate(**given)
-    before = (tmp_path / "results.json").read_bytes()
-    with pytest.raises(ResultsError, match=r"results\.json already exists: continue with --resume"):
-        evaluate(**given)
-    assert (tmp_path / "results.json").read_bytes() == before
-    with pytest.raises(ResultsError, match="choose one"):
-        evaluate(**given, resume=True, overwrite=True)
 
 
 def interrupted(monkeypatch, after):

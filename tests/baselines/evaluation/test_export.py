@@ -52,12 +52,9 @@ def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
     np.testing.assert_array_equal(table[0, 1:], [*scenario.start, *np.zeros(6)])
     np.testing.assert_array_equal(table[1:, 1:7], track.q)
     np.testing.assert_array_equal(table[1:, 7:], track.qdot)
-
-
-def test_units_of_prismatic_joints(tmp_path):
-    evaluate(circle("tiago", steps=3), "dls", out=tmp_path, export=["csv", "csv"])
-    (name,) = files(tmp_path)
-    head, _ = read_csv(tmp_path / "export" / name)
+    evaluate(circle("tiago", steps=3), "dls", out=tmp_path / "tiago", export=["csv", "csv"])
+    (name,) = files(tmp_path / "tiago")
+    head, _ = read_csv(tmp_path / "tiago" / "export" / name)
     assert [head[1], head[2], head[9]] == ["torso_lift_joint [m]", "arm_1_joint [rad]", "torso_lift_joint [m/s]"]
 
 

@@ -5,7 +5,7 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import baselines
 import ikgym
@@ -121,33 +121,6 @@ def test_a_joint_at_its_limit_counts_though_its_policy_keeps_the_limit():
     assert row.steps_at_velocity_limit == (shown == VELOCITY).any(axis=1).sum() > 20
     assert row.steps_at_acceleration_limit >= (shown == ACCELERATION).any(axis=1).sum() > 20
     assert not row.followed
-
-
-def test_the_warm_up_call_leaves_no_trace_in_the_episode():
-    which = scenario(steps=20)
-    solver = baselines.make("rhc_gradient", which)
-    calls = []
-
-    class Counting:
-        preview = solver.preview
-        commands = 0
-        batched = True
-        report = staticmethod(solver.report)
-        diagnostics = staticmethod(solver.diagnostics)
-
-        def predict(self, observation, state=None):
-            calls.append(state)
-            answer = solver.predict(observation, state)
-            if len(calls) == 1:
-                observation["q"][:] = observation["nominal"][:] = 99.0  # what is warmed up with is a copy
-            return answer
-
-    episode = rollout(which, Counting(), 0)
-    assert len(calls) == 21
-    assert calls[0] is None
-    assert calls[1] is None
-    assert all(state is not None for state in calls[2:])
-    assert_array_equal(episode.qdot, rollout(which, solver, 0).qdot)
 
 
 def test_metrics_equal_a_plain_numpy_computation():

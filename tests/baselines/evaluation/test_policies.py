@@ -33,6 +33,8 @@ class Borrowed:
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         self.calls.append((state, episode_start.tolist(), deterministic))
         action, _ = self.solver.predict(observation)
+        if len(self.calls) == 1:  # does not count, and leaves no trace
+            observation["q"][:] = observation["nominal"][:] = 99.0
         return action, (0 if state is None else state) + 1
 
 
