@@ -31,11 +31,7 @@ class Predictor(Protocol):
     """An object with the `predict` of Stable-Baselines3."""
 
     def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = False,
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """An action and the state for the next call."""
 

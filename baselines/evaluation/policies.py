@@ -10,12 +10,7 @@ from typing import Any, Final
 
 from baselines import registry
 from baselines.evaluation.foreign import Predictor, Wrap
-from baselines.evaluation.specification import (
-    ObjectSpecification,
-    SolverSpecification,
-    Specification,
-    shown_preview,
-)
+from baselines.evaluation.specification import ObjectSpecification, SolverSpecification, Specification, shown_preview
 from baselines.policy import SolverPolicy
 from baselines.policy.protocol import Policy
 from baselines.recording import Seeds

@@ -120,13 +120,7 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = 
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
-def readme(
-    rows: Sequence[Row],
-    skipped: Sequence[Skipped] = (),
-    *,
-    command: str,
-    date: datetime.datetime,
-) -> str:
+def readme(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
     """The README of a folder of results, in Markdown."""
     out = ["# Results", ""]
     parameters = ["| scenario | policy | parameters |", "|---|---|---|"]

@@ -64,10 +64,7 @@ def evaluate(
 
 
 def carry_out(
-    options: Options,
-    *,
-    command: str = "baselines.evaluate.evaluate(…)",
-    show: Callable[[Rows], None] | None = None,
+    options: Options, *, command: str = "baselines.evaluate.evaluate(…)", show: Callable[[Rows], None] | None = None
 ) -> Rows:
     """See :func:`evaluate`. The files state the command; `show` is called with the rows before they are written."""
     jobs, skipped = plan(options)

@@ -130,12 +130,7 @@ def _drawn(scenario: Scenario) -> bool:
 
 
 def optima(
-    todo: Sequence[SeededScenario],
-    how: Search,
-    policies: Sequence[str] = (),
-    *,
-    cache: bool,
-    workers: Workers = ALONE,
+    todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool, workers: Workers = ALONE
 ) -> Iterator[tuple[Scenario, Seeds, Optimum]]:
     """Searches episodes, with a bar on stderr, and yields each as soon as it is done."""
     wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]

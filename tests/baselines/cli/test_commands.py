@@ -140,8 +140,7 @@ SCENARIOS = (*ikgym.scenarios.names(), *ikgym.scenarios.problems_from_elsewhere(
 
 
 @pytest.mark.parametrize(
-    ("word", "names"),
-    [("arms", ikgym.arms.names()), ("scenarios", SCENARIOS), ("policies", baselines.names())],
+    ("word", "names"), [("arms", ikgym.arms.names()), ("scenarios", SCENARIOS), ("policies", baselines.names())]
 )
 def test_lists_are_complete_and_fit_and_every_member_is_shown_in_full(word, names, capsys):
     assert main([word]) == 0

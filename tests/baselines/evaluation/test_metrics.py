@@ -54,10 +54,7 @@ def handmade(steps=4, **changes):
         "iterations": np.ones(steps, dtype=np.int64),
         "time_ns": np.full(steps, 1000, dtype=np.int64),
     }
-    return Episode(
-        diagnostics={},
-        **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
-    )
+    return Episode(diagnostics={}, **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}})
 
 
 def position_scenario(steps=4, **changes):

@@ -15,10 +15,7 @@ import ikgym
 from baselines.cli import main
 
 ROBOTS = Path(__file__).parents[3] / "robots"
-CHAINS = {
-    "ur10": ("base_link", "tool0"),
-    "ur10_rail": ("world", "tool0"),
-}
+CHAINS = {"ur10": ("base_link", "tool0"), "ur10_rail": ("world", "tool0")}
 SCENARIO = """
 name = "{robot}"
 task = "pose"
