@@ -41,20 +41,11 @@ def restored(values):
 
 
 def handmade(steps=4, **changes):
-    arrays = {
-        "q": np.zeros((steps, 3)),
-        "qdot": np.zeros((steps, 3)),
-        "pose": np.zeros((steps, 3)),
-        "tracking_cost": np.zeros(steps),
-        "velocity_cost": np.zeros(steps),
-        "position_error": np.zeros(steps),
-        "orientation_error": np.full(steps, np.nan),
-        "at_limit": np.zeros((steps, 3)),
-        "status": np.zeros(steps, dtype=np.int64),
-        "iterations": np.ones(steps, dtype=np.int64),
-        "time_ns": np.full(steps, 1000, dtype=np.int64),
-    }
-    return Episode(diagnostics={}, **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}})
+    arrays = dict.fromkeys(("q", "qdot", "pose", "at_limit"), np.zeros((steps, 3)))
+    arrays |= dict.fromkeys(("tracking_cost", "velocity_cost", "position_error"), np.zeros(steps))
+    arrays |= {"orientation_error": np.full(steps, np.nan), "status": np.zeros(steps, dtype=np.int64)}
+    arrays |= {"iterations": np.ones(steps, dtype=np.int64), "time_ns": np.full(steps, 1000, dtype=np.int64)}
+    return Episode(diagnostics={}, **arrays | {name: np.asarray(values) for name, values in changes.items()})
 
 
 def position_scenario(steps=4, **changes):

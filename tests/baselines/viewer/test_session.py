@@ -1,6 +1,5 @@
 """What the viewer shows, moment by moment: the episode as the environment has it, and arms that follow a target."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -41,22 +40,13 @@ def moved(frame, shift, turn=0.0):
 def test_a_replay_is_the_episode(scenario):
     stage = Stage.of(scenario, seed=3, steps=12)
     (replay,) = play_all(stage, ["dls", "dls"])
-    policy = baselines.make("dls", stage.scenario)
-    env = gym.make("RedundantIK-v0", scenario=stage.scenario, preview=policy.preview)
-    observation, _ = env.reset(seed=3)
-    np.testing.assert_array_equal(replay.q[0], observation["q"])
-    state, cost = None, 0.0
-    for k in range(1, 13):
-        action, state = policy.predict(observation, state)
-        observation, reward, _, _, info = env.step(action)
-        cost -= reward
-        np.testing.assert_array_equal(replay.q[k], observation["q"])
-        assert replay.position_error[k] == info["position_error"]
-        assert replay.cost[k] == pytest.approx(cost, rel=1e-12)
-        if stage.scenario.task.has_orientation:
-            assert replay.orientation_error[k] == info["orientation_error"]
-    assert np.isnan(replay.orientation_error).all() == (not stage.scenario.task.has_orientation)
-    found = stage.scenario.task.coordinates(stage.frames[:, :9].reshape(-1, 3, 3), stage.frames[:, 9:])
+    track, task = baselines.track(stage.scenario, "dls", seed=3), stage.scenario.task
+    np.testing.assert_array_equal(replay.q, np.vstack([stage.start, track.q]))
+    for name in ("position_error", "orientation_error"):
+        np.testing.assert_array_equal(getattr(replay, name)[1:], getattr(track, name))
+    np.testing.assert_allclose(np.diff(replay.cost), track.cost, rtol=1e-9)
+    assert np.isnan(replay.orientation_error).all() == (not task.has_orientation)
+    found = task.coordinates(stage.frames[:, :9].reshape(-1, 3, 3), stage.frames[:, 9:])
     np.testing.assert_allclose(found, stage.scenario.nominal(3), atol=1e-12)
     _, tool = stage.scenario.arm.forward(stage.start)
     assert stage.errors[0] == pytest.approx(np.linalg.norm(tool - stage.frames[0, 9:]), abs=1e-12)
