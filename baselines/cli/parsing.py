@@ -35,17 +35,11 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class Rule:
-    """Options that have an effect only together with others.
+    """Options that have an effect only together with others."""
 
-    Args:
-        names: The options, such as ``"--resume"``.
-        used: Whether they have an effect, given all options of the command.
-        otherwise: When they have none, such as "without --out", for the message.
-    """
-
-    names: tuple[str, ...]
-    used: Callable[[Any], bool]
-    otherwise: str
+    names: tuple[str, ...]  # the options, such as ``"--resume"``
+    used: Callable[[Any], bool]  # whether they have an effect, given all options of the command
+    otherwise: str  # when they have none, such as "without --out", for the message
 
 
 def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: str, rules: Iterable[Rule] = ()) -> T:

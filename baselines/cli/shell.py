@@ -124,23 +124,15 @@ N = TypeVar("N", bound=Names)
 
 @dataclasses.dataclass(frozen=True)
 class Catalogue:
-    """A registry for printing.
+    """A registry for printing."""
 
-    Args:
-        kind: The word for a member.
-        names: Gives the names of all members.
-        head: Heads of the columns; the last column fills the line.
-        row: The other cells of a member's line.
-        full: The full description of a member; the command prints its own where there is none.
-        endings: Suffixes of files that are shown in full like members.
-    """
-
-    kind: str
-    names: Callable[[], Sequence[str]]
-    head: tuple[str, ...]
-    row: Callable[[str], tuple[str, ...]]
+    kind: str  # the word for a member
+    names: Callable[[], Sequence[str]]  # gives the names of all members
+    head: tuple[str, ...]  # heads of the columns; the last column fills the line
+    row: Callable[[str], tuple[str, ...]]  # the other cells of a member's line
+    # the full description of a member; the command prints its own where there is none
     full: Callable[[str], str] | None = None
-    endings: tuple[str, ...] = ()
+    endings: tuple[str, ...] = ()  # suffixes of files that are shown in full like members
 
 
 def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:

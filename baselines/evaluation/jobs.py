@@ -108,37 +108,22 @@ class Options:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Job:
-    """One episode to be played.
-
-    Args:
-        scenario: The scenario.
-        specification: The policy, not yet bound to the scenario.
-        given: The parameters of its constructor for this episode.
-        parameters: All of its parameters, as rows state them.
-        seeds: Seeds of the episode.
-        first: Whether it is the first episode of its policy in its scenario; its trajectory log is kept.
-        record: Whether the record of the episode is needed, for the log or for an export.
-        timed: Whether it is played by itself and timed.
-        preview: Steps ahead that the policy is shown, or which ones.
-        fingerprint: Digest of the scenario.
-        ideal: Digest of the scenario with an ideal plant.
-        test_set: Digest of the test set of the episode; None if it belongs to none.
-        before: Number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy
-            keeps its state.
-    """
+    """One episode to be played."""
 
     scenario: Scenario
-    specification: Specification
-    given: Mapping[str, Any]
-    parameters: Mapping[str, Any]
+    specification: Specification  # the policy, not yet bound to the scenario
+    given: Mapping[str, Any]  # the parameters of its constructor for this episode
+    parameters: Mapping[str, Any]  # all of its parameters, as rows state them
     seeds: Seeds
-    first: bool
-    record: bool
-    timed: bool
-    preview: Preview
+    first: bool  # whether it is the first episode of its policy in its scenario; its trajectory log is kept
+    record: bool  # whether the record of the episode is needed, for the log or for an export
+    timed: bool  # whether it is played by itself and timed
+    preview: Preview  # steps ahead that the policy is shown, or which ones
     fingerprint: str
-    ideal: str
-    test_set: str | None = None
+    ideal: str  # digest of the scenario with an ideal plant
+    test_set: str | None = None  # digest of the test set of the episode; None if it belongs to none
+    # number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy keeps
+    # its state
     before: int = 0
 
     @property
@@ -161,17 +146,11 @@ class Job:
 
 
 class Skipped(NamedTuple):
-    """A policy that does not suit a scenario.
-
-    Attributes:
-        scenario: The name of the scenario.
-        policy: The name of the policy.
-        reason: Why it does not suit.
-    """
+    """A policy that does not suit a scenario."""
 
     scenario: str
     policy: str
-    reason: str
+    reason: str  # why it does not suit
 
 
 def plan(options: Options) -> tuple[list[Job], list[Skipped]]:

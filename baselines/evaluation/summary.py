@@ -20,19 +20,12 @@ from ikgym.exceptions import IkgymError, InvalidInputError
 
 
 class Paired(NamedTuple):
-    """A policy compared with itself on an ideal plant, on the same reset seeds.
+    """A policy compared with itself on an ideal plant, on the same reset seeds."""
 
-    Attributes:
-        cost_ratio: Geometric mean of the cost ratio on the ideal plant; None where it is not known.
-        mean: Geometric mean of the cost divided by that of the same seed on the ideal plant.
-        low: Lower end of its 95 % interval over the seeds.
-        high: Upper end.
-    """
-
-    cost_ratio: float | None
-    mean: float
-    low: float
-    high: float
+    cost_ratio: float | None  # geometric mean of the cost ratio on the ideal plant; None where it is not known
+    mean: float  # geometric mean of the cost divided by that of the same seed on the ideal plant
+    low: float  # lower end of its 95 % interval over the seeds
+    high: float  # upper end
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

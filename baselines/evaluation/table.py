@@ -29,25 +29,15 @@ def number(value: float | None, scale: float = 1.0) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """A column of a table of summaries.
+    """A column of a table of summaries."""
 
-    Args:
-        title: Its head.
-        unit: The second line of the head; empty for pure numbers.
-        value: The value of a cell: a float, an integer, a text, or None.
-        scale: Factor of floats.
-        text: The text of a cell, if it is not that of its value.
-        about: A description, shown in HTML when the pointer is on the head.
-        drop: If a line is too short, columns are left out from the highest number down; those with 0 stay.
-    """
-
-    title: str
-    unit: str
-    value: Callable[[Summary], float | str | None]
-    scale: float = 1.0
-    text: Callable[[Summary], str] | None = None
-    about: str = ""
-    drop: int = 0
+    title: str  # its head
+    unit: str  # the second line of the head; empty for pure numbers
+    value: Callable[[Summary], float | str | None]  # the value of a cell: a float, an integer, a text, or None
+    scale: float = 1.0  # factor of floats
+    text: Callable[[Summary], str] | None = None  # the text of a cell, if it is not that of its value
+    about: str = ""  # a description, shown in HTML when the pointer is on the head
+    drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
 
     @property
     def head(self) -> str:

@@ -34,15 +34,10 @@ MOST_BYTES, MOST_PARTS = 2**27, 2000
 
 
 class Shape(NamedTuple):
-    """A mesh that moves with a frame of an arm.
+    """A mesh that moves with a frame of an arm."""
 
-    Attributes:
-        frame: Number of the frame: 0 for the base, then one for each joint.
-        mesh: A `trimesh.Trimesh`, in that frame.
-    """
-
-    frame: int
-    mesh: Any
+    frame: int  # number of the frame: 0 for the base, then one for each joint
+    mesh: Any  # a `trimesh.Trimesh`, in that frame
 
 
 class DrawnArm:

@@ -24,21 +24,14 @@ POSTURES = 512
 
 
 class Reading(NamedTuple):
-    """The readings of a posture.
+    """The readings of a posture."""
 
-    Attributes:
-        manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
-        share: The same as a share of the largest among random postures, between 0 and 1.
-        margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
-        joints: Colours of the n joints: ``FREE``, ``NEAR`` or ``AT``.
-        tool: Colour of the tool: from vermilion in a singular posture to bluish green in the best one.
-    """
-
-    manipulability: float
-    share: float
+    manipulability: float  # Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation
+    share: float  # the same as a share of the largest among random postures, between 0 and 1
+    # distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,)
     margins: FloatArray
-    joints: list[Colour]
-    tool: Colour
+    joints: list[Colour]  # colours of the n joints: ``FREE``, ``NEAR`` or ``AT``
+    tool: Colour  # colour of the tool: from vermilion in a singular posture to bluish green in the best one
 
 
 class Reader:

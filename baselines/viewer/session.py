@@ -33,27 +33,16 @@ class Mode(enum.Enum):
 
 
 class Shown(NamedTuple):
-    """The arm of one policy at one time.
-
-    Attributes:
-        policy: The name of the policy.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        position_error: Distance from the reference in [m], NaN without one.
-        orientation_error: Angle in [rad], NaN also if the task has no orientation.
-        cost: Accumulated cost of the episode, NaN outside of it.
-        status: Status of the policy's last step.
-        reading: Manipulability and limits.
-        closest: The closest pair of bodies and obstacles.
-    """
+    """The arm of one policy at one time."""
 
     policy: str
-    q: FloatArray
-    position_error: float
-    orientation_error: float
-    cost: float
-    status: str
-    reading: Reading
-    closest: Closest
+    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (n,)
+    position_error: float  # distance from the reference in [m], NaN without one
+    orientation_error: float  # angle in [rad], NaN also if the task has no orientation
+    cost: float  # accumulated cost of the episode, NaN outside of it
+    status: str  # status of the policy's last step
+    reading: Reading  # manipulability and limits
+    closest: Closest  # the closest pair of bodies and obstacles
 
 
 class Session:

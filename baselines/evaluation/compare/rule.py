@@ -22,19 +22,12 @@ Rows = Mapping[str, Row]
 
 @dataclasses.dataclass(frozen=True)
 class Recommendation:
-    """A solver for a path.
+    """A solver for a path."""
 
-    Args:
-        solver: Its name; None where no solver follows the path.
-        retimed: Whether it follows the retimed path alone.
-        late: Whether it follows with late drives, too.
-        reason: Why this one.
-    """
-
-    solver: str | None
-    retimed: bool
-    late: bool
-    reason: str
+    solver: str | None  # its name; None where no solver follows the path
+    retimed: bool  # whether it follows the retimed path alone
+    late: bool  # whether it follows with late drives, too
+    reason: str  # why this one
 
     def __str__(self) -> str:
         if self.solver is None:

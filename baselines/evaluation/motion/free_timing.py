@@ -24,17 +24,11 @@ LONGER = (1, 2, 4)
 
 
 class PathScores(NamedTuple):
-    """How a path was followed.
+    """How a path was followed."""
 
-    Attributes:
-        time: When its end was reached, in [s]; None if it was not.
-        position_error: Largest distance from the reference at the policy's own progress, in [m].
-        orientation_error: Likewise, in [rad]; None for tasks whose coordinates are no angles.
-    """
-
-    time: float | None
-    position_error: float
-    orientation_error: float | None
+    time: float | None  # when its end was reached, in [s]; None if it was not
+    position_error: float  # largest distance from the reference at the policy's own progress, in [m]
+    orientation_error: float | None  # likewise, in [rad]; None for tasks whose coordinates are no angles
 
 
 def play_to_end(

@@ -13,16 +13,11 @@ from ikgym.validation import FloatArray
 
 
 class Motion(NamedTuple):
-    """The joint motion of an episode, from its start.
+    """The joint motion of an episode, from its start."""
 
-    Attributes:
-        times: From 0, in [s]. Shape (steps + 1,).
-        q: Joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n).
-        qdot: Joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n).
-    """
-
-    times: FloatArray
-    q: FloatArray
+    times: FloatArray  # from 0, in [s]. Shape (steps + 1,)
+    q: FloatArray  # joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n)
+    # joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n)
     qdot: FloatArray
 
     @classmethod
