@@ -17,7 +17,6 @@ from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, meas
 from baselines.evaluation.summary import summarise
 from baselines.files import from_json
 from baselines.recording import Episode, Seeds
-from baselines.statistics import Spread
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.limited import limited
@@ -218,39 +217,6 @@ def test_a_row_survives_json():
     there = dataclasses.replace(row, total_cost=math.inf).to_json()
     assert there["total_cost"] is None
     assert math.isnan(restored(there).total_cost)
-
-
-def test_summaries():
-    base = row_of(position_scenario(), handmade())
-    rows = [
-        dataclasses.replace(
-            base,
-            seed=seed,
-            total_cost=cost,
-            tracking_cost=cost,
-            position_error_max=error,
-            time_p50_us=time,
-            time_p99_us=2 * time,
-            deadline_misses=seed,
-            solver_status=status,
-            followed=error < 0.2,
-        )
-        for seed, cost, error, time, status in (
-            (1, 1.0, 0.3, 5.0, "converged"),
-            (2, 100.0, 0.1, 7.0, "rank_deficient"),
-            (3, 10.0, 0.2, 6.0, "iteration_limit"),
-        )
-    ]
-    other = dataclasses.replace(base, policy="moore_penrose")
-    first, second = summarise([*rows, other])
-    assert (first.label, second.label) == ("dls", "moore_penrose")
-    assert first.episodes == 3
-    assert first.total_cost == Spread(pytest.approx(10.0), 10.0, pytest.approx(82.0), 100.0, 2)
-    assert first.largest("position_error_max") == 0.3
-    assert first.largest("orientation_error_max") is None
-    assert (first.median("time_p50_us"), first.largest("time_p99_us"), first.total("deadline_misses")) == (6.0, 14.0, 6)
-    assert (first.solver_status, first.followed) == ("rank_deficient", 1)
-    assert first.cost_ratio is None
 
 
 @pytest.mark.parametrize("change", [{"fingerprint": "g"}, {"test_set": "0123456789ab"}])

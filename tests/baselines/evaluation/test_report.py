@@ -88,13 +88,24 @@ def test_a_row_knows_whether_accelerations_are_stated(changes, stated):
 
 
 def test_several_episodes_are_put_together():
-    costs = {2_000_000: 10.0, 2_000_001: 1000.0, 2_000_002: 1e6}
-    text = report.table([row(scenario="varga7-random", seed=seed, total_cost=cost) for seed, cost in costs.items()])
+    rows = [
+        row(
+            scenario="varga7-random", seed=seed, total_cost=cost, position_error_max=error, time_p50_us=time,
+            time_p99_us=2 * time, deadline_misses=seed % 10, solver_status=status, followed=error < 0.2,
+        )
+        for seed, cost, error, time, status in (
+            (2_000_001, 10.0, 0.03, 5.0, "converged"),
+            (2_000_002, 1000.0, 0.01, 7.0, "rank_deficient"),
+            (2_000_003, 1e6, 0.2, 6.0, "iteration_limit"),
+        )
+    ]  # fmt: skip
+    text = report.table(rows)
     assert text.startswith("varga7-random: 3 episodes of 3000 steps")
-    assert text.split("\n")[4].endswith("0 of 3  converged")
+    cells = "dls 2154 301.2 200.0 16.88 13.31 500.0 6.000 14.00 6 2 of 3 rank_deficient"
+    assert text.split("\n")[4].split() == cells.split()
     assert "total cost over the episodes of varga7-random" in text
-    (line,) = (line for line in text.split("\n") if "2000002" in line)
-    assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "2000002", "0"]
+    (line,) = (line for line in text.split("\n") if "2000003" in line)
+    assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "2000003", "1"]
     assert "geometric means" in text
 
 
