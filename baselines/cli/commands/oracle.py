@@ -188,10 +188,9 @@ def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -
     return None
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line, by default the process's; returns the exit code: 1 if a record fails the check."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    return shell.run(lambda: _carry_out(given), lambda: "Stopped. Optima that were found are kept.")
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code, 1 if a record fails the check."""
+    return shell.run(lambda: _carry_out(arguments), lambda: "Stopped. Optima that were found are kept.")
 
 
 def _carry_out(arguments: Sequence[str]) -> int:

@@ -129,9 +129,8 @@ Agents are trained on the seeds of the split "train" and validated on those of "
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line, by default the process's; returns the exit code: 1 if a repetition ends with other weights."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code, 1 if a repetition ends with other weights."""
     out: pathlib.Path | None = None
 
     def work() -> int:

@@ -58,9 +58,8 @@ Examples:
   {prog} --scenario lab.toml --policy qp --urdf lab.urdf"""
 
 
-def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:
-    """The command line, by default the process's, until Ctrl-C or `stop`; returns the exit code."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+def main(arguments: Sequence[str], stop: threading.Event | None = None) -> int:
+    """The command line: words after the command; runs until Ctrl-C or `stop`, and returns the exit code."""
 
     def work() -> int:
         options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
