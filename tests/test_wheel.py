@@ -122,13 +122,13 @@ def test_the_environment_runs_from_the_wheel(installed):
 def test_agents_are_evaluated_from_the_wheel(installed):
     run, _, folder = installed
     policies = ("dls", "agent_alone")
-    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out", "--plots")
+    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out")
     assert "varga7-random" in done.stdout
     rows = json.loads((folder / "out" / "results.json").read_text())
     rows = rows["rows"] if isinstance(rows, dict) else rows
     assert [row["policy"] for row in rows] == list(policies)
     assert all(row["cost_ratio"] > 0.9 for row in rows)
-    assert len(list((folder / "out" / "plots").rglob("*.png"))) >= 5
+    assert (folder / "out" / "report.html").exists()
 
 
 @pytest.mark.slow

@@ -30,14 +30,7 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after ``ikgym``; those of the process if left out.
-
-    Returns:
-        The exit code of the command; 2 after an expected error, 130 after Ctrl-C.
-    """
+    """Runs the command line, by default the process's; returns the exit code, see :func:`baselines.cli.shell.run`."""
     first, *others = (sys.argv[1:] if arguments is None else list(arguments)) or ["--help"]
     return shell.run(lambda: _command(first)(others))
 
@@ -57,11 +50,7 @@ in which every solver is a policy.
 
 
 def _command(word: str) -> Callable[[Sequence[str]], int]:
-    """The function of a command.
-
-    Raises:
-        UnknownNameError: There is no such command; the message has the nearest name.
-    """
+    """The function of a command."""
     if word in ("-h", "--help", "--version"):
         return lambda others: _print_about(word, others)
     if word not in COMMANDS:

@@ -11,7 +11,6 @@ import tyro
 from baselines.cli.parsing import Rule
 from baselines.cli.robot import RobotOptions
 from ikgym import scenarios, tasks
-from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import from_csv
@@ -47,13 +46,7 @@ RULES = (Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), 
 
 
 def scenario_of(options: OwnPath) -> Scenario:
-    """The scenario that the options mean, over its whole path where they name a CSV file.
-
-    Raises:
-        UnknownNameError: There is no such scenario, arm, link or task.
-        InvalidInputError: A file cannot be read, or an option is missing or wrong.
-        MissingDependencyError: A URDF file is named, and Pinocchio is not installed.
-    """
+    """The scenario that the options mean, over its whole path where they name a CSV file."""
     if options.file.endswith(".csv"):
         return _from_csv(options)
     scenario = scenarios.find(options.file)
@@ -63,15 +56,10 @@ def scenario_of(options: OwnPath) -> Scenario:
     return scenario.replace(**changes) if changes else scenario
 
 
-def arm_of(options: OwnPath) -> Arm:
-    """The arm that the options name."""
+def _from_csv(options: OwnPath) -> Scenario:
     if options.arm is None:
         raise InvalidInputError(f"--arm: expected the name of an arm or FILE.urdf beside {options.file}, got none.")
-    return options.robot(options.arm)
-
-
-def _from_csv(options: OwnPath) -> Scenario:
-    arm, speed = arm_of(options), options.speed
+    arm, speed = options.robot(options.arm), options.speed
     law: dict[str, Any] = {}
     if speed is not None:
         usual = number("--speed", speed, above=0.0) / SPEEDING_UP

@@ -35,28 +35,15 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class Rule:
-    """Options that have an effect only together with others.
+    """Options that have an effect only together with others."""
 
-    Args:
-        names: The options, such as ``"--resume"``.
-        used: Whether they have an effect, given all options of the command.
-        otherwise: When they have none, such as "without --out", for the message.
-    """
-
-    names: tuple[str, ...]
-    used: Callable[[Any], bool]
-    otherwise: str
+    names: tuple[str, ...]  # the options, such as ``"--resume"``
+    used: Callable[[Any], bool]  # whether they have an effect, given all options of the command
+    otherwise: str  # when they have none, such as "without --out", for the message
 
 
 def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: str, rules: Iterable[Rule] = ()) -> T:
     """Reads the words after a command. Modules in the current folder can be imported from then on.
-
-    Args:
-        kind: The type of the options, for :func:`tyro.cli`.
-        arguments: The words.
-        prog: The name of the command.
-        description: The text of ``--help`` above the options.
-        rules: Options that are refused where they have no effect.
 
     Raises:
         InvalidInputError: An option is unknown, missing, repeated, refused or without effect, or its value is empty or
@@ -83,12 +70,7 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
 
 
 def varies(scenario: str | Scenario) -> bool:
-    """Whether the episodes of a scenario differ from reset to reset.
-
-    Raises:
-        UnknownNameError: There is no such scenario.
-        InvalidInputError: Its file or module gives none.
-    """
+    """Whether the episodes of a scenario differ from reset to reset."""
     found = scenarios.find(scenario)
     return found.random or found.plant.random
 
@@ -105,11 +87,7 @@ def find_own_modules() -> None:
 
 
 def _given(arguments: Sequence[str]) -> dict[str, str]:
-    """The options as they are spelt in the help, and as they were given.
-
-    Raises:
-        InvalidInputError: One is given twice, or has an empty text as its value.
-    """
+    """The options as they are spelt in the help, and as they were given."""
     out: dict[str, str] = {}
     last = "the command"
     for word in arguments:

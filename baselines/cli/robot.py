@@ -26,13 +26,7 @@ class RobotOptions:
     """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
 
     def robot(self, name: str) -> Arm:
-        """The arm of a URDF file, or of the catalogue by its name.
-
-        Raises:
-            InvalidInputError: The file has no such chain, or a number is out of range.
-            UnknownNameError: There is no such arm or link.
-            MissingDependencyError: Pinocchio is not installed.
-        """
+        """The arm of a URDF file, or of the catalogue by its name."""
         urdf = name.endswith(".urdf")
         return self.accelerated(
             arms.from_urdf(name, base=self.base, tip=self.tip, tool=self.tool) if urdf else arms.get(name)

@@ -12,7 +12,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 import tyro
@@ -27,55 +27,22 @@ CONSOLE = "ikgym"
 
 #: The extra that installs a package.
 EXTRAS = {
-    "torch": "train",
-    "stable_baselines3": "train",
-    "sb3_contrib": "train",
-    "tensorboard": "train",
-    "rich": "train",
-    "optuna": "train",
-    "yaml": "train",
-    "h5py": "data",
-    "minari": "data",
-    "pinocchio": "urdf",
-    "toppra": "paths",
-    "moviepy": "video",
-    "ray": "cluster",
-    "trimesh": "view",
-    "viser": "view",
-    "yourdfpy": "view",
+    **dict.fromkeys(("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "rich", "optuna", "yaml"), "train"),
+    **dict.fromkeys(("trimesh", "viser", "yourdfpy"), "view"),
+    **{"h5py": "data", "minari": "data", "pinocchio": "urdf", "toppra": "paths", "moviepy": "video", "ray": "cluster"},
 }
 
 
-class Resumable(Protocol):
-    """The options of a command that writes into a folder, and continues there with ``--resume``."""
-
-    @property
-    def out(self) -> pathlib.Path | None: ...  # noqa: D102
-
-
-P = TypeVar("P", bound=Resumable)
+P = TypeVar("P")
 
 
 def program(name: str, otherwise: str) -> str:
-    """The name of a command in this process.
-
-    Args:
-        name: Its name behind ``ikgym``.
-        otherwise: Its name if Python runs its module, such as ``"python -m baselines.evaluate"``.
-    """
+    """The name of a command behind ``ikgym``, or the other one if Python runs its module."""
     return f"{CONSOLE} {name}" if pathlib.Path(sys.argv[0]).stem == CONSOLE else otherwise
 
 
 def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped.") -> int:
-    """Runs a command.
-
-    Args:
-        work: Returns the exit code.
-        stopped: Gives the message after Ctrl-C.
-
-    Returns:
-        The exit code: that of the work, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """Runs a command; returns its exit code, 2 after an expected error, 130 and the message `stopped` after Ctrl-C."""
     try:
         code = work()
         sys.stdout.flush()
@@ -108,25 +75,17 @@ def run_resumable(
     work: Callable[[P, str], None],
     rules: Iterable[Rule] = (),
 ) -> int:
-    """Reads the options of a command that writes into the folder of ``--out``, and does its work.
+    """Reads the options of a command that writes into the folder of ``--out``, does its work, returns the exit code.
 
-    Args:
-        kind: The type of the options; `workers`, `episodes` and `trials`, if there are such, are checked.
-        arguments: The words after the command; those of the process if left out.
-        prog: The name of the command.
-        manual: Gives the text of ``--help`` above the options for that name.
-        work: Called with the options and the whole command line.
-        rules: See :func:`parse`.
-
-    Returns:
-        The exit code, see :func:`run`.
+    `workers`, `episodes` and `trials`, if there are such options, are checked. The work is called with the options and
+    the whole command line.
     """
     given, out = sys.argv[1:] if arguments is None else list(arguments), None
 
     def both() -> int:
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
-        out = options.out
+        out = getattr(options, "out")  # noqa: B009  # a folder, or None
         for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
             if (value := getattr(options, name, None)) is not None:
                 whole_number(name, value, at_least=1, at_most=most)
@@ -165,23 +124,15 @@ N = TypeVar("N", bound=Names)
 
 @dataclasses.dataclass(frozen=True)
 class Catalogue:
-    """A registry for printing.
+    """A registry for printing."""
 
-    Args:
-        kind: The word for a member.
-        names: Gives the names of all members.
-        head: Heads of the columns; the last column fills the line.
-        row: The other cells of a member's line.
-        full: The full description of a member; the command prints its own where there is none.
-        endings: Suffixes of files that are shown in full like members.
-    """
-
-    kind: str
-    names: Callable[[], Sequence[str]]
-    head: tuple[str, ...]
-    row: Callable[[str], tuple[str, ...]]
+    kind: str  # the word for a member
+    names: Callable[[], Sequence[str]]  # gives the names of all members
+    head: tuple[str, ...]  # heads of the columns; the last column fills the line
+    row: Callable[[str], tuple[str, ...]]  # the other cells of a member's line
+    # the full description of a member; the command prints its own where there is none
     full: Callable[[str], str] | None = None
-    endings: tuple[str, ...] = ()
+    endings: tuple[str, ...] = ()  # suffixes of files that are shown in full like members
 
 
 def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
@@ -193,19 +144,7 @@ def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> i
 
 
 def members(word: str, catalogue: Catalogue, arguments: Sequence[str], kind: type[N], rules: Iterable[Rule] = ()) -> N:
-    """The arguments of a command that shows members of a catalogue; prints the catalogue where none is named.
-
-    Args:
-        word: The command.
-        catalogue: The catalogue.
-        arguments: Names, or options.
-        kind: The type of the arguments.
-        rules: See :func:`parse`.
-
-    Raises:
-        UnknownNameError: There is no such member; the message has the nearest name.
-        InvalidInputError: An option is refused.
-    """
+    """The arguments of a command that shows members of a catalogue; prints the catalogue where none is named."""
     description = f"Lists the {word}, or shows some in full."
     given = parse(kind, arguments, prog=f"{CONSOLE} {word}", description=description, rules=rules)
     known = catalogue.names()
@@ -218,12 +157,7 @@ def members(word: str, catalogue: Catalogue, arguments: Sequence[str], kind: typ
 
 
 def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
-    """A table whose first row is the head, its last column wrapped to fit.
-
-    Args:
-        rows: Cells, the same number in each row.
-        most: Characters of a line.
-    """
+    """A table of rows of cells, the head first; the last column is wrapped to fit the width in characters."""
     sizes = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
     start = sum(sizes) + 2 * len(sizes)
     lines = []

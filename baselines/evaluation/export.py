@@ -129,46 +129,26 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     return log | {"clearance": episode.clearance[kept]} | carried(scenario, seeds, log["q"][frames], after[frames])
 
 
-#: The axes of the arrays of a log; those that have names of one letter are of the same length in all arrays.
-AXES: Mapping[str, tuple[str | int, ...]] = {
-    **dict.fromkeys(("nominal", "pose"), ("k", "m")),
-    **dict.fromkeys(("q", "qdot", "nominal_q", "qddot"), ("k", "n")),
-    **dict.fromkeys(("time", "position_error", "orientation_error", "clearance"), ("k",)),
-    **dict.fromkeys(("joint_names", "prismatic", "lower", "upper", "velocity_limit", "acceleration_limit"), ("n",)),
-    "frame": ("f",),
-    "joint_points": ("f", "n", 2, 3),
-    "tool": ("f", 3),
-    "tool_rotation": ("f", 3, 3),
-    "solids": ("s", 16),
-    "carriers": ("s",),
-    "carrier_frames": ("f", "c", 12),
-    "closest": ("f", 2, 3),
-}
+#: Arrays of every log; of those with collisions; and of some.
+USUAL = (
+    *("time", "nominal", "pose", "q", "qdot", "position_error", "joint_names", "prismatic", "lower", "upper"),
+    *("velocity_limit", "frame", "joint_points", "tool", "tool_rotation"),
+)
 CONTACTS = ("clearance", "solids", "carriers", "carrier_frames", "closest")
-OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q", *CONTACTS)
+OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q")
 
 
 def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Checks names, shapes and types of the arrays of a log that was read.
+    """Checks the names of the arrays of a log that was read.
 
     Raises:
-        ValueError: One is missing, unknown or of another type, or lengths do not fit together.
+        ValueError: One is missing or unknown.
     """
-    known_names("array of a log", log, tuple(AXES))
-    lengths: dict[str | int, int] = {length: length for length in (2, 3, 12, 16)}
-    for name, axes in AXES.items():
-        if name not in log and name in OPTIONAL:
-            continue
-        shape = log[name].shape if name in log else None
-        kinds, what = ("U", "texts") if name == "joint_names" else ("fiub", "numbers")
-        if shape is None or log[name].dtype.kind not in kinds or len(shape) != len(axes):
-            raise ValueError(f"expected {what} of shape {axes} in the array {name}, got shape {shape}")
-        if any(lengths.setdefault(axis, length) != length for axis, length in zip(axes, shape, strict=True)):
-            raise ValueError(f"the shape {shape} of the array {name} does not fit the others")
-    if (there := [name in log for name in CONTACTS]) != [there[0]] * len(there):
+    known_names("array of a log", log, (*USUAL, *CONTACTS, *OPTIONAL))
+    if missing := [name for name in USUAL if name not in log]:
+        raise ValueError(f"the array {missing[0]} is missing")
+    if 0 < sum(name in log for name in CONTACTS) < len(CONTACTS):
         raise ValueError(f"expected all or none of the arrays {', '.join(CONTACTS)}")
-    if there[0] and not np.isin(log["carriers"], np.arange(lengths["c"])).all():
-        raise ValueError(f"expected numbers below {lengths['c']} in the array carriers")
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:

@@ -31,11 +31,7 @@ class Predictor(Protocol):
     """An object with the `predict` of Stable-Baselines3."""
 
     def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = False,
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """An action and the state for the next call."""
 
@@ -45,13 +41,6 @@ class ForeignPolicy:
     """A foreign policy. Properties that it does not state are left empty, never guessed.
 
     It is called for one arm at a time, with ``deterministic=True``.
-
-    Args:
-        name: The name in messages and rows.
-        model: The object.
-        preview: Steps ahead that it is shown, or which ones.
-        wrap: Wraps the environment; None for the environment as it is.
-        parameters: Its parameters, as far as they are known.
     """
 
     name: str
@@ -63,11 +52,7 @@ class ForeignPolicy:
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
-        """The action for one arm, and the state for the next call; an episode begins where `episode_start` is given.
-
-        Raises:
-            InvalidInputError: The model raises an error, or does not return numbers and a state.
-        """
+        """The action for one arm, and the state for the next call; an episode begins where `episode_start` is given."""
         memory, start = (None, True) if state is None else (state[0], episode_start is not None)
         try:
             answer = self.model.predict(observation, state=memory, episode_start=np.array([start]), deterministic=True)
@@ -92,11 +77,7 @@ class ForeignPolicy:
         return {}
 
     def misfit(self, scenario: Scenario) -> str | None:
-        """Why the spaces of the model do not fit a scenario; None if they do, or if it has none.
-
-        Raises:
-            InvalidInputError: The preview is not valid, or the environment cannot be wrapped.
-        """
+        """Why the spaces of the model do not fit a scenario; None if they do, or if it has none."""
         shown: gym.Space[Any]
         needed: gym.Space[Any]
         if self.wrap is None:
@@ -113,11 +94,7 @@ class ForeignPolicy:
         return None
 
     def environment(self, scenario: Scenario) -> tuple[gym.Env[Any, Any], Recorder]:
-        """The environment in its wrappers, and the recorder inside of them.
-
-        Raises:
-            InvalidInputError: The preview is not valid, or the environment cannot be wrapped.
-        """
+        """The environment in its wrappers, and the recorder inside of them."""
         assert self.wrap is not None
         made = gym.make("RedundantIK-v0", scenario=scenario, preview=self.preview, disable_env_checker=True)
         recorder = Recorder(made)
@@ -131,11 +108,7 @@ class ForeignPolicy:
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Records an environment in float64, inside of other wrappers.
-
-    Args:
-        env: The environment, from :func:`gymnasium.make`.
-    """
+    """Records an environment in float64, inside of other wrappers."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
@@ -151,11 +124,7 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
         return len(self.rows) == self.steps
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins the episode.
-
-        Raises:
-            InvalidInputError: A wrapper starts elsewhere than the scenario, or resets during the episode.
-        """
+        """Begins the episode; refused if a wrapper starts elsewhere than the scenario, or resets during the episode."""
         if options:
             raise InvalidInputError(f"wrap: expected resets without options, got {options!r}.")
         if 0 < len(self.rows) < self.steps:
@@ -184,15 +153,7 @@ def play_wrapped(
 ) -> Episode:
     """Plays one episode in the wrapped environment; costs and errors are those inside of the wrappers, in float64.
 
-    Args:
-        scenario: The scenario.
-        policy: The policy, with a `wrap`.
-        seed: The reset seed; other seeds cannot be passed through wrappers.
-        timed: Whether the calls are timed.
-        tick: Reports progress.
-
-    Raises:
-        InvalidInputError: The environment cannot be wrapped, the episode ends early, or an action is invalid.
+    Seeds other than the reset seed cannot be passed through wrappers.
     """
     seeds = Seeds.of(seed)
     if seeds != Seeds(seeds.seed):

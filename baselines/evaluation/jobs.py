@@ -71,8 +71,6 @@ class Options:
     """Continue with the results in the folder: finished episodes are not played again."""
     overwrite: bool = False
     """Replace the results in the folder."""
-    plots: bool = False
-    """Draw plots as PNG files into the folder: errors, joint motion, cost against time. report.html has its own."""
     report: bool = True
     """Write report.html into the folder: table, plots and replays in one page that opens without a network."""
     export: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FORMAT …")] = ()
@@ -110,37 +108,22 @@ class Options:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Job:
-    """One episode to be played.
-
-    Args:
-        scenario: The scenario.
-        specification: The policy, not yet bound to the scenario.
-        given: The parameters of its constructor for this episode.
-        parameters: All of its parameters, as rows state them.
-        seeds: Seeds of the episode.
-        first: Whether it is the first episode of its policy in its scenario; its trajectory log is kept.
-        record: Whether the record of the episode is needed, for the log or for an export.
-        timed: Whether it is played by itself and timed.
-        preview: Steps ahead that the policy is shown, or which ones.
-        fingerprint: Digest of the scenario.
-        ideal: Digest of the scenario with an ideal plant.
-        test_set: Digest of the test set of the episode; None if it belongs to none.
-        before: Number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy
-            keeps its state.
-    """
+    """One episode to be played."""
 
     scenario: Scenario
-    specification: Specification
-    given: Mapping[str, Any]
-    parameters: Mapping[str, Any]
+    specification: Specification  # the policy, not yet bound to the scenario
+    given: Mapping[str, Any]  # the parameters of its constructor for this episode
+    parameters: Mapping[str, Any]  # all of its parameters, as rows state them
     seeds: Seeds
-    first: bool
-    record: bool
-    timed: bool
-    preview: Preview
+    first: bool  # whether it is the first episode of its policy in its scenario; its trajectory log is kept
+    record: bool  # whether the record of the episode is needed, for the log or for an export
+    timed: bool  # whether it is played by itself and timed
+    preview: Preview  # steps ahead that the policy is shown, or which ones
     fingerprint: str
-    ideal: str
-    test_set: str | None = None
+    ideal: str  # digest of the scenario with an ideal plant
+    test_set: str | None = None  # digest of the test set of the episode; None if it belongs to none
+    # number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy keeps
+    # its state
     before: int = 0
 
     @property
@@ -154,11 +137,7 @@ class Job:
         return metrics.key(self.scenario.name, self.policy, self.parameters, self.seeds, self.scenario.steps)
 
     def bind(self) -> Policy:
-        """The policy.
-
-        Raises:
-            ResultsError: The file behind the policy has changed since the evaluation began.
-        """
+        """The policy; refused if the file behind it has changed since the evaluation began."""
         policy = self.specification.bind(self.scenario, self.given, self.preview)
         now = self.specification.parameters(self.scenario, policy)
         if now != self.parameters:
@@ -167,17 +146,11 @@ class Job:
 
 
 class Skipped(NamedTuple):
-    """A policy that does not suit a scenario.
-
-    Attributes:
-        scenario: The name of the scenario.
-        policy: The name of the policy.
-        reason: Why it does not suit.
-    """
+    """A policy that does not suit a scenario."""
 
     scenario: str
     policy: str
-    reason: str
+    reason: str  # why it does not suit
 
 
 def plan(options: Options) -> tuple[list[Job], list[Skipped]]:

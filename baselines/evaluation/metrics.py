@@ -166,12 +166,7 @@ class Row:
 
 
 def lost(position_error: float, orientation_error: float | None) -> bool:
-    """Whether an arm was lost; an error that is NaN counts as lost.
-
-    Args:
-        position_error: The largest of the episode, in [m].
-        orientation_error: Likewise, in [rad]; None where the scenario has no orientation.
-    """
+    """Whether an arm was lost, by its largest errors in [m] and [rad] (None without one); NaN counts as lost."""
     return not _within(LOST_POSITION, LOST_ORIENTATION, position_error, orientation_error)
 
 

@@ -53,11 +53,6 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
 
     On a cluster nothing is timed: timed jobs are played here, after all others.
 
-    Args:
-        jobs: The jobs.
-        workers: The workers.
-        progress: Whether to show a bar on stderr.
-
     Raises:
         InvalidInputError: A policy refuses what it is shown, cannot be sent to a worker, or chooses an invalid action.
         WorkerError: Workers died repeatedly over one batch, or have other costs than this machine.
@@ -93,12 +88,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
 
 
 def play(batch: Batch, tick: Tick | None = None) -> Results:
-    """Plays jobs of one policy in one scenario together; a timed one has to be alone.
-
-    Args:
-        batch: The jobs.
-        tick: Reports progress.
-    """
+    """Plays jobs of one policy in one scenario together; a timed one has to be alone."""
     first = batch[0]
     policy = first.bind()
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
@@ -123,14 +113,6 @@ def play_episodes(
 ) -> list[Episode]:
     """Plays episodes of a policy, in the wrapped environment if it needs one; with free timing, to the end of the path.
 
-    Args:
-        scenario: The scenario.
-        policy: The policy.
-        seeds: Seeds of the episodes.
-        preview: Steps ahead that the policy is shown.
-        timed: Whether the calls are timed.
-        tick: Reports progress.
-
     Raises:
         InvalidInputError: The policy refuses what it is shown, or chooses an invalid action.
     """
@@ -145,10 +127,6 @@ def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     """Jobs that are played together, in their order.
 
     Timed jobs are played alone, and so are those of a reference that is bound to one episode.
-
-    Args:
-        jobs: All jobs.
-        most: Most jobs of a batch.
     """
     out: list[Batch] = []
     for _, alike in itertools.groupby(jobs, _together):
@@ -242,11 +220,7 @@ class _ClusterCheck:
         self._replayed: dict[tuple[str, str], set[str]] = {}
 
     def check(self, batch: Batch, results: Results, node: str) -> None:
-        """Checks the results of a batch, and plays an episode again for each kind of machine.
-
-        Raises:
-            WorkerError: A worker has played something else, or has other costs than this machine.
-        """
+        """Checks the results of a batch, and plays an episode again for each kind of machine."""
         first, (row, _) = batch[0], results[0]
         expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
         if [(one.key, one.fingerprint, one.machine.get("ikgym")) for one, _ in results] != expected:
@@ -263,11 +237,7 @@ class _ClusterCheck:
 
 
 def compare(there: Row, here: Row, tolerance: float) -> None:
-    """Compares costs of a cluster with those of this machine; those that are not finite have to be equal.
-
-    Raises:
-        WorkerError: They differ.
-    """
+    """Compares costs of a cluster with those of this machine; those that are not finite have to be equal."""
     for name in ("total_cost", "tracking_cost", "velocity_cost"):
         far, near = getattr(there, name), getattr(here, name)
         both_nan = math.isnan(far) and math.isnan(near)

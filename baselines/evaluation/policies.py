@@ -10,12 +10,7 @@ from typing import Any, Final
 
 from baselines import registry
 from baselines.evaluation.foreign import Predictor, Wrap
-from baselines.evaluation.specification import (
-    ObjectSpecification,
-    SolverSpecification,
-    Specification,
-    shown_preview,
-)
+from baselines.evaluation.specification import ObjectSpecification, SolverSpecification, Specification, shown_preview
 from baselines.policy import SolverPolicy
 from baselines.policy.protocol import Policy
 from baselines.recording import Seeds
@@ -32,13 +27,7 @@ AnyPolicy = PolicySpec | type[Any] | Predictor | SolverPolicy | tuple[type[Any],
 
 
 def specifications(given: AnyPolicy | Iterable[AnyPolicy], *, wrap: Wrap | None = None) -> list[Specification]:
-    """All policies of an evaluation.
-
-    Args:
-        given: Names, ``"name:parameter=value"``, ``"package.module:Class"`` with or without parameters, pairs of one
-            of them or of a class and parameters, classes and instances of policies, and objects with the `predict` of
-            Stable-Baselines3; ``"all"`` stands for all registered policies.
-        wrap: Wraps the environment for policies that are no :class:`SolverPolicy`.
+    """All policies of an evaluation, in the forms that :func:`baselines.evaluate.evaluate` takes.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -105,11 +94,7 @@ def bind(
 
 
 def check_picklable(all_of: Iterable[Specification]) -> None:
-    """Checks that policies can be sent to worker processes.
-
-    Raises:
-        InvalidInputError: One cannot.
-    """
+    """Refuses policies that cannot be sent to worker processes."""
     for one in all_of:
         try:
             pickle.dumps(one)

@@ -174,14 +174,9 @@ def from_csv(text: str) -> list[dict[str, str]]:
 
 
 def markdown(lines: Sequence[Record], columns: Sequence[str] = ()) -> str:
-    """The records as a Markdown table: four significant digits, intervals in one cell, units in the heads.
+    """The records, or those of a CSV file, as a Markdown table with four significant digits, and units in the heads.
 
-    Args:
-        lines: The records, or those of a CSV file.
-        columns: Names of the columns; all of them if left out. `low` stands for the interval.
-
-    Raises:
-        InvalidInputError: There is no such column.
+    The column `low` stands for the interval. All columns are shown if none is named.
     """
     names = [name for name in columns or lines[0] if not _ends(name, "high")]
     if missing := [name for name in names if name not in lines[0]]:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import datetime
-import pathlib
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-from urllib.parse import quote
 
 from baselines.canonical import canonical
 from baselines.evaluation.jobs import Skipped
@@ -19,10 +17,6 @@ from baselines.statistics import Spread
 
 #: Characters that a line of the printed tables may have.
 WIDTH = 120
-#: The plots of a scenario: captions and files, relative to the folder, by the group they are shown in.
-Pictures = Mapping[str, Sequence[tuple[str, pathlib.PurePath]]]
-#: The group of plots that show all policies.
-OVERVIEW = "overview"
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
 STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
@@ -45,17 +39,16 @@ RATIO = Column(
     lambda s: s.cost_ratio and s.cost_ratio.mean,
     about="total cost / best known cost, geometric mean over the episodes",
 )
+
+
+def _largest(column: str, title: str, unit: str, about: str, scale: float = 1.0, drop: int = 0) -> Column:
+    return Column(title, unit, lambda s: s.largest(column), scale, about=about, drop=drop)
+
+
 ERRORS = (
-    Column("pos max", "[mm]", lambda s: s.largest("position_error_max"), 1e3, about="largest position error"),
-    Column(
-        "ori max",
-        "[mrad]",
-        lambda s: s.largest("orientation_error_max"),
-        1e3,
-        about="largest orientation error",
-        drop=1,
-    ),
-    Column("q̇ peak", "", lambda s: s.largest("qdot_peak"), about="largest joint velocity, in rad/s or m/s", drop=2),
+    _largest("position_error_max", "pos max", "[mm]", "largest position error", 1e3),
+    _largest("orientation_error_max", "ori max", "[mrad]", "largest orientation error", 1e3, drop=1),
+    _largest("qdot_peak", "q̇ peak", "", "largest joint velocity, in rad/s or m/s", drop=2),
     Column(
         "q̈ peak",
         "",
@@ -67,17 +60,17 @@ ERRORS = (
 )
 TIMES = (
     Column("p50", "[µs]", lambda s: s.median("time_p50_us"), about="median time of a call after the first"),
-    Column("p99", "[µs]", lambda s: s.largest("time_p99_us"), about="99th percentile of these times", drop=5),
+    _largest("time_p99_us", "p99", "[µs]", "99th percentile of these times", drop=5),
     Column("misses", "", lambda s: s.total("deadline_misses"), about="such calls longer than Δt", drop=6),
 )
 PATH = (
     Column("path time", "[s]", lambda s: s.path_time, about="when the end of the path was reached, with free timing"),
-    Column(
+    _largest(
+        "path_position_error",
         "path err",
         "[mm]",
-        lambda s: s.largest("path_position_error"),
+        "largest distance from the reference at the policy's own progress, with free timing",
         1e3,
-        about="largest distance from the reference at the policy's own progress, with free timing",
     ),
 )
 CONTACTS = (
@@ -110,13 +103,7 @@ COLUMNS = (
 
 
 def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
-    """The tables of all scenarios as plain text.
-
-    Args:
-        rows: The results.
-        skipped: Policies that were skipped, named below the tables.
-        width: Characters that a line may have. Columns that do not fit are left out, and named below.
-    """
+    """The tables of all scenarios as plain text; notes name skipped policies, and columns that do not fit the width."""
     parts: list[str] = []
     absent: dict[str, None] = {}
     for scenario, summaries in by_scenario(rows).items():
@@ -133,36 +120,14 @@ def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = 
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
-def readme(
-    rows: Sequence[Row],
-    skipped: Sequence[Skipped] = (),
-    *,
-    command: str,
-    date: datetime.datetime,
-    pictures: Mapping[str, Pictures] | None = None,
-) -> str:
-    """The README of a folder of results, in Markdown.
-
-    Args:
-        rows: The results.
-        skipped: Policies that were skipped.
-        command: The command of the evaluation.
-        date: When it finished.
-        pictures: The plots of each scenario.
-    """
+def readme(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
+    """The README of a folder of results, in Markdown."""
     out = ["# Results", ""]
     parameters = ["| scenario | policy | parameters |", "|---|---|---|"]
     for scenario, summaries in by_scenario(rows).items():
         out += [f"## {escaped(heading(scenario, summaries))}", "", markdown(COLUMNS, summaries), ""]
         if spread := _spread(summaries):
             out += [f"{_score(summaries).capitalize()} over the episodes:", "", markdown(spread, summaries), ""]
-        for group, files in (pictures or {}).get(scenario, {}).items():
-            # The plots of single policies are many: collapsed, so that the tables stay together.
-            collapsed = group != OVERVIEW
-            out += ["<details>", f"<summary>{group}</summary>", ""] if collapsed else []
-            for caption, file in files:
-                out += [f"![{escaped(caption)}]({quote(file.as_posix())})", "", f"*{escaped(caption)}.*", ""]
-            out += ["</details>", ""] if collapsed else []
         for one in summaries:
             values = ", ".join(code(f"{name}={value}") for name, value in one.first.parameters.items()) or NOTHING
             values = values.replace("|", "\\|")  # nothing else has a meaning in code

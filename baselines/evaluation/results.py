@@ -41,7 +41,7 @@ COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 #: The report of a folder.
 PAGE = "report.html"
 #: Files of a folder that are replaced by --overwrite; other files are left alone.
-WRITTEN = ("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz", "plots/*/*.png")
+WRITTEN = ("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz")
 
 
 class Rows(list[Row]):
@@ -115,15 +115,7 @@ class Results:
         return all(file.exists() for file in files)
 
     def add(self, jobs: Sequence[Job], results: Iterable[tuple[Row, Episode | None]]) -> None:
-        """Keeps results.
-
-        Args:
-            jobs: The jobs that were played.
-            results: The row of each, and the record of its episode if files need it.
-
-        Raises:
-            ResultsError: The folder cannot be written.
-        """
+        """Keeps the rows of jobs that were played, and the records of their episodes where files need them."""
         for job, (row, episode) in zip(jobs, results, strict=True):
             self._rows[row.key] = row
             if episode is None:
@@ -146,19 +138,11 @@ class Results:
         write(self.export_file(row, kind), content)
 
     def save(self) -> None:
-        """Writes results.json.
-
-        Raises:
-            ResultsError: The folder cannot be written.
-        """
+        """Writes results.json."""
         write_json(self._file, [row.to_json() for row in self.rows])
 
     def save_csv(self) -> None:
-        """Writes results.csv: the rows as a table, None as an empty cell, objects and lists as JSON.
-
-        Raises:
-            ResultsError: The folder cannot be written.
-        """
+        """Writes results.csv: the rows as a table, None as an empty cell, objects and lists as JSON."""
         text = io.StringIO(newline="")
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -181,11 +165,7 @@ class Results:
         return self.directory / folder / slug(row.scenario) / f"{slug(row.policy)}-{digest}{ending}"
 
     def series(self, row: Row) -> dict[str, npt.NDArray[Any]]:
-        """The trajectory log of the first episode of a row's policy in its scenario.
-
-        Raises:
-            ResultsError: The file is missing or damaged.
-        """
+        """The trajectory log of the first episode of a row's policy in its scenario."""
         file, advice = self.series_file(row), "Delete it and run again with --resume."
         log = read_arrays(file, advice)
         with reading(file, advice):

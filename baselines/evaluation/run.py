@@ -40,7 +40,7 @@ def evaluate(
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.
         **options: Fields of :class:`baselines.evaluation.jobs.Options`: test_sets, episodes, split, steps, preview,
-            wrap, timed, workers, cluster, out, resume, overwrite, plots, report, export, noise_seeds, pairs, progress.
+            wrap, timed, workers, cluster, out, resume, overwrite, report, export, noise_seeds, pairs, progress.
             More than one of `workers` needs a main module that may be imported, that is with
             ``if __name__ == "__main__":``.
 
@@ -64,18 +64,9 @@ def evaluate(
 
 
 def carry_out(
-    options: Options,
-    *,
-    command: str = "baselines.evaluate.evaluate(…)",
-    show: Callable[[Rows], None] | None = None,
+    options: Options, *, command: str = "baselines.evaluate.evaluate(…)", show: Callable[[Rows], None] | None = None
 ) -> Rows:
-    """See :func:`evaluate`.
-
-    Args:
-        options: All options.
-        command: The command, for the files.
-        show: Called with the rows before plots are drawn.
-    """
+    """See :func:`evaluate`. The files state the command; `show` is called with the rows before they are written."""
     jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
     workers.check()
@@ -99,17 +90,11 @@ def carry_out(
 
 
 def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
-    """Writes plots, tables and the report."""
-    pictures = {}
-    if options.plots:
-        # matplotlib is slow to import, and most evaluations from Python draw nothing.
-        from baselines.evaluation.plots import draw
-
-        pictures = draw(results, progress=options.progress)
+    """Writes tables and the report."""
     results.save()
     results.save_csv()
     now = datetime.datetime.now(datetime.UTC)
-    text = report.readme(results.rows, rows.skipped, command=command, date=now, pictures=pictures)
+    text = report.readme(results.rows, rows.skipped, command=command, date=now)
     write(results.directory / "README.md", text.encode())
     if options.report:
         from baselines.evaluation.html import page

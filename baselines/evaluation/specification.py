@@ -22,11 +22,7 @@ from ikgym.scenarios.preview import offsets
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Specification(abc.ABC):
-    """A policy specification, not yet bound to a scenario.
-
-    Args:
-        name: The name of the policy in rows.
-    """
+    """A policy specification, not yet bound to a scenario."""
 
     name: str
 
@@ -46,16 +42,7 @@ class Specification(abc.ABC):
 
     @abc.abstractmethod
     def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
-        """The policy for a scenario.
-
-        Args:
-            scenario: The scenario.
-            given: The parameters from :meth:`given`.
-            preview: Steps ahead that the policy is shown; its own if None.
-
-        Raises:
-            IkgymError: The policy cannot be made.
-        """
+        """The policy for a scenario, with the parameters from :meth:`given`, shown its own preview if None."""
 
     def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
         """The parameters of the bound policy for rows."""
@@ -69,13 +56,7 @@ class Specification(abc.ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SolverSpecification(Specification):
-    """A class of policies with its parameters.
-
-    Args:
-        name: The name of the policy in rows.
-        kind: The class, or the reason why a registered policy cannot be imported.
-        chosen: The parameters that the user gives.
-    """
+    """A class of policies, or the reason why a registered one cannot be imported, with the user's parameters."""
 
     kind: type[SolverPolicy] | str
     chosen: Mapping[str, Any]
@@ -127,11 +108,7 @@ class _RefusedError(InvalidInputError):
 class ObjectSpecification(Specification):
     """A policy that is bound to a scenario, an object with the `predict` of Stable-Baselines3, or a factory of either.
 
-    Args:
-        name: The name of the policy in rows.
-        model: The object, the class or factory, or its import path ``"package.module:Class"``.
-        chosen: The parameters that a class or factory is called with.
-        wrap: Wraps the environment.
+    The model may be an import path ``"package.module:Class"``; a factory is called with the chosen parameters.
     """
 
     model: Any
@@ -149,11 +126,7 @@ class ObjectSpecification(Specification):
         return not isinstance(self.model, SolverPolicy)
 
     def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
-        """See :meth:`Specification.bind`.
-
-        Raises:
-            InvalidInputError: It cannot be imported or made, has no `predict`, or does not state its preview.
-        """
+        """See :meth:`Specification.bind`."""
         del given
         model = registry.load(self.model) if isinstance(self.model, str) else self.model
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
@@ -218,15 +191,7 @@ def _misfit(name: str, policy: SolverPolicy, scenario: Scenario) -> str | None:
 
 
 def shown_preview(policy: Policy, preview: Preview | None) -> Preview:
-    """The steps ahead that a policy is shown.
-
-    Args:
-        policy: The policy.
-        preview: The user's choice; None for that of the policy.
-
-    Raises:
-        InvalidInputError: The chosen steps do not begin with those that a solver needs.
-    """
+    """The steps ahead that a policy is shown: its own, or the user's, which begin with those that a solver needs."""
     if preview is None or isinstance(policy, ForeignPolicy):
         return policy.preview
     if isinstance(preview, int):

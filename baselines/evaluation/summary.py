@@ -20,29 +20,19 @@ from ikgym.exceptions import IkgymError, InvalidInputError
 
 
 class Paired(NamedTuple):
-    """A policy compared with itself on an ideal plant, on the same reset seeds.
+    """A policy compared with itself on an ideal plant, on the same reset seeds."""
 
-    Attributes:
-        cost_ratio: Geometric mean of the cost ratio on the ideal plant; None where it is not known.
-        mean: Geometric mean of the cost divided by that of the same seed on the ideal plant.
-        low: Lower end of its 95 % interval over the seeds.
-        high: Upper end.
-    """
-
-    cost_ratio: float | None
-    mean: float
-    low: float
-    high: float
+    cost_ratio: float | None  # geometric mean of the cost ratio on the ideal plant; None where it is not known
+    mean: float  # geometric mean of the cost divided by that of the same seed on the ideal plant
+    low: float  # lower end of its 95 % interval over the seeds
+    high: float  # upper end
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Summary:
     """The episodes of one policy in one scenario. Episodes that differ in their noise alone count as one.
 
-    Args:
-        rows: Their rows.
-        ideal: The rows of the same policy with an ideal plant; empty if the plant is ideal, or it has not played there.
-        label: The name of the policy among those of the scenario.
+    `ideal` has the rows of the same policy with an ideal plant; it is empty if the plant is ideal itself.
     """
 
     rows: Sequence[Row]
@@ -167,8 +157,7 @@ def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, flo
 def summarise(rows: Iterable[Row]) -> list[Summary]:
     """One summary for each policy with its parameters in each scenario, in the order of their first rows.
 
-    Raises:
-        InvalidInputError: Rows cannot be compared: two scenarios share a name, or rows belong to different test sets.
+    Refused where two scenarios share a name, or rows belong to different test sets.
     """
     groups: dict[tuple[str, str, str, int], list[Row]] = {}
     contents: dict[str, tuple[str, str | None]] = {}

@@ -29,25 +29,15 @@ def number(value: float | None, scale: float = 1.0) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """A column of a table of summaries.
+    """A column of a table of summaries."""
 
-    Args:
-        title: Its head.
-        unit: The second line of the head; empty for pure numbers.
-        value: The value of a cell: a float, an integer, a text, or None.
-        scale: Factor of floats.
-        text: The text of a cell, if it is not that of its value.
-        about: A description, shown in HTML when the pointer is on the head.
-        drop: If a line is too short, columns are left out from the highest number down; those with 0 stay.
-    """
-
-    title: str
-    unit: str
-    value: Callable[[Summary], float | str | None]
-    scale: float = 1.0
-    text: Callable[[Summary], str] | None = None
-    about: str = ""
-    drop: int = 0
+    title: str  # its head
+    unit: str  # the second line of the head; empty for pure numbers
+    value: Callable[[Summary], float | str | None]  # the value of a cell: a float, an integer, a text, or None
+    scale: float = 1.0  # factor of floats
+    text: Callable[[Summary], str] | None = None  # the text of a cell, if it is not that of its value
+    about: str = ""  # a description, shown in HTML when the pointer is on the head
+    drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
 
     @property
     def head(self) -> str:
@@ -83,13 +73,7 @@ def filled(columns: Iterable[Column], summaries: Sequence[Summary]) -> list[Colu
 
 
 def plain(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> str:
-    """A table as plain text.
-
-    Args:
-        columns: Its columns, the first one the names of the policies; empty ones are left out, as in all tables.
-        summaries: Its lines.
-        width: Characters that a line may have; columns stand closer together if they would not fit.
-    """
+    """A table as plain text: policies first, columns closer together if they would not fit, empty ones left out."""
     columns = filled(columns, summaries)
     heads = [[column.title for column in columns], [column.unit for column in columns]]
     heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in summaries]
@@ -165,12 +149,6 @@ def code(text: str) -> str:
 
 
 def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:
-    """A Markdown table of cells.
-
-    Args:
-        head: The names of the columns.
-        lines: The cells.
-        text: Numbers of the columns that are aligned to the left.
-    """
+    """A Markdown table of cells; the columns whose numbers are in `text` are aligned to the left."""
     rules = [":--" if column in text else "--:" for column in range(len(head))]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, rules, *lines))

@@ -16,23 +16,15 @@ from ikgym.scenarios import Scenario
 
 @dataclasses.dataclass(frozen=True)
 class TestSet:
-    """A fixed set of test episodes.
+    """A fixed set of test episodes."""
 
-    Args:
-        name: The name of the set and of its scenario.
-        episodes: The number of episodes: the first seeds of the split.
-        digest: The value of :func:`baselines.fingerprints.set_hash` when the set was defined.
-        split: The split of the seeds, see :data:`ikgym.scenarios.SPLITS`.
-        noise_seeds: Repetitions of each episode with other noise in sensors and drives.
-        sequence: Episodes that one arm plays in a row: seed s has the arm seed s // sequence, and the policy keeps its
-            state. 1 if every episode has its own arm.
-    """
-
-    name: str
-    episodes: int
-    digest: str
-    split: str = "test"
-    noise_seeds: int = 1
+    name: str  # the name of the set and of its scenario
+    episodes: int  # the number of episodes: the first seeds of the split
+    digest: str  # the value of :func:`baselines.fingerprints.set_hash` when the set was defined
+    split: str = "test"  # the split of the seeds, see :data:`ikgym.scenarios.SPLITS`
+    noise_seeds: int = 1  # repetitions of each episode with other noise in sensors and drives
+    # episodes that one arm plays in a row: seed s has the arm seed s // sequence, and the policy keeps its state.
+    # 1 if every episode has its own arm
     sequence: int = 1
 
     @property
@@ -88,12 +80,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> TestSet:
-    """The test set of a name.
-
-    Raises:
-        UnknownNameError: There is no such set.
-        InvalidInputError: Its scenario, its seeds or the cost have changed.
-    """
+    """The test set of a name; refused if its scenario, its seeds or the cost have changed."""
     if name not in SETS:
         raise UnknownNameError("test set", name, SETS)
     found = SETS[name]

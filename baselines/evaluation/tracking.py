@@ -106,19 +106,11 @@ class Tracking:
         return out
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
-        """Writes one line a step; the head has the units, NaN is an empty cell.
-
-        Raises:
-            ResultsError: The file cannot be written.
-        """
+        """Writes one line a step; the head has the units, NaN is an empty cell."""
         write(pathlib.Path(file), table(self.columns()))
 
     def to_joint_trajectory(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
         """Writes the joint motion, from rest to rest, as a ROS 2 `JointTrajectory` in JSON.
-
-        Args:
-            file: The file.
-            accelerations: Whether points have accelerations.
 
         Raises:
             InvalidInputError: The episode ends in motion, and has no room to stop.
@@ -132,7 +124,7 @@ class Tracking:
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
-        return picture.draw(f"{self.scenario}: {self.policy}", [(self.policy, trajectory_log(*self._played))])
+        return picture.draw(f"{self.scenario}: {self.policy}", trajectory_log(*self._played))
 
 
 def track(

@@ -24,27 +24,18 @@ from ikgym.validation import FloatArray
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
-    """Motions of `qp` along a path, from N starts and within all limits of the arm.
+    """Motions of `qp` along a path, from N starts and within all limits of the arm."""
 
-    Args:
-        times: From the start on, in [s]. Shape (k + 1,).
-        q: Joint coordinates in [rad] or [m]. Shape (k + 1, N, n).
-        position_error: In [m]. Shape (k, N).
-        orientation_error: In [rad]; 0 where the task has no orientation. Shape (k, N).
-        held_back: Joints that the limits of the arm held back in each step. Shape (k, N).
-        clearance: Smallest signed distance between bodies in [m], infinite where nothing can meet. Shape (k, N).
-        pair: The closest pair, and the one that touched at a stop; -1 where nothing can meet. Shape (k, N, 2).
-        stopped: 1 where bodies have touched and the arm stands still. Shape (k, N).
-    """
-
-    times: FloatArray
-    q: FloatArray
-    position_error: FloatArray
-    orientation_error: FloatArray
-    held_back: FloatArray
+    times: FloatArray  # from the start on, in [s]. Shape (k + 1,)
+    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (k + 1, N, n)
+    position_error: FloatArray  # in [m]. Shape (k, N)
+    orientation_error: FloatArray  # in [rad]; 0 where the task has no orientation. Shape (k, N)
+    held_back: FloatArray  # joints that the limits of the arm held back in each step. Shape (k, N)
+    # smallest signed distance between bodies in [m], infinite where nothing can meet. Shape (k, N)
     clearance: FloatArray
+    # the closest pair, and the one that touched at a stop; -1 where nothing can meet. Shape (k, N, 2)
     pair: npt.NDArray[np.int64]
-    stopped: FloatArray
+    stopped: FloatArray  # 1 where bodies have touched and the arm stands still. Shape (k, N)
 
     def of(self, row: int) -> Motion:
         """The motion from one of the starts."""
@@ -53,11 +44,7 @@ class Motion:
 
 
 def path_duration(scenario: Scenario) -> float:
-    """The time that the path takes, or the episode where the path goes on for ever, in [s].
-
-    Raises:
-        InvalidInputError: The path differs from reset to reset.
-    """
+    """The time that the path takes, or the episode where the path goes on for ever, in [s]."""
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     ends = duration(scenario.trajectory)
@@ -85,12 +72,7 @@ def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> d
 
 
 def played(scenario: Scenario, starts: FloatArray) -> Motion:
-    """`qp` on a scenario; where it has collisions, the starts have to be clear.
-
-    Args:
-        scenario: A result of :func:`ideal`.
-        starts: Joint coordinates in [rad] or [m]. Shape (N, n).
-    """
+    """`qp` on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, starts must be clear."""
     policy, rows = registry.make("qp", scenario), len(starts)
     simulator = Simulator(scenario, rows, policy.preview)
     simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(0)[0]] * rows, starts)

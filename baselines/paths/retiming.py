@@ -27,19 +27,12 @@ Errors = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Retimed:
-    """A scenario that can be driven.
+    """A scenario that can be driven."""
 
-    Args:
-        scenario: The path from the best start, in the time of `qp`.
-        duration: That time, in [s].
-        asked: The time that was asked for, in [s].
-        motion: The motion of `qp` that was checked.
-    """
-
-    scenario: Scenario
-    duration: float
-    asked: float
-    motion: Motion
+    scenario: Scenario  # the path from the best start, in the time of `qp`
+    duration: float  # that time, in [s]
+    asked: float  # the time that was asked for, in [s]
+    motion: Motion  # the motion of `qp` that was checked
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,12 +69,7 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False) -> Retimed:
 
 
 def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
-    """The result of :func:`retime`; None where no start leads along the whole path, or `qp` follows from none.
-
-    Args:
-        found: The survey of the path.
-        fastest: See :func:`retime`.
-    """
+    """The result of :func:`retime`; None where no start leads along the whole path, or `qp` follows from none."""
     for errors in (FOLLOWED, REACHED):
         best = _best(found, errors, fastest)
         if best is not None:

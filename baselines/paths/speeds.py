@@ -18,12 +18,7 @@ POINTS = 4001
 
 @dataclasses.dataclass(frozen=True)
 class Speeds:
-    """Largest speeds of the tool along a path.
-
-    Args:
-        linear: In [m/s].
-        angular: In [rad/s]; 0 where there is no orientation.
-    """
+    """Largest speeds of the tool along a path in [m/s] and [rad/s]; 0 where there is no orientation."""
 
     linear: float
     angular: float

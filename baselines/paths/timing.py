@@ -21,15 +21,10 @@ FASTEST = 6.0
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JointPath:
-    """Joint coordinates over the time of a trajectory, at grid points.
+    """Joint coordinates over the time of a trajectory, at grid points."""
 
-    Args:
-        progress: Times of the trajectory in [s], rising from 0. Shape (k,).
-        q: Joint coordinates in [rad] or [m]. Shape (k, n).
-    """
-
-    progress: FloatArray
-    q: FloatArray
+    progress: FloatArray  # times of the trajectory in [s], rising from 0. Shape (k,)
+    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (k, n)
 
     @classmethod
     def of(cls, progress: FloatArray, q: FloatArray, fastest: FloatArray) -> JointPath:
@@ -49,19 +44,12 @@ class JointPath:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Limits:
-    """Limits that a timing keeps.
+    """Limits that a timing keeps."""
 
-    Args:
-        velocity: In [rad/s] or [m/s]. Shape (n,).
-        acceleration: In [rad/s²] or [m/s²], inf where there is none. Shape (n,).
-        dt: The control period in [s].
-        rate: Largest rate of the new time against the old one; inf for none.
-    """
-
-    velocity: FloatArray
-    acceleration: FloatArray
-    dt: float
-    rate: float = np.inf
+    velocity: FloatArray  # in [rad/s] or [m/s]. Shape (n,)
+    acceleration: FloatArray  # in [rad/s²] or [m/s²], inf where there is none. Shape (n,)
+    dt: float  # the control period in [s]
+    rate: float = np.inf  # largest rate of the new time against the old one; inf for none
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -93,12 +81,7 @@ class Timing:
 
 
 def shortest(path: JointPath, limits: Limits) -> Timing | None:
-    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still.
-
-    Args:
-        path: The path.
-        limits: What holds.
-    """
+    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still."""
     import toppra
 
     logging.getLogger("toppra").setLevel(logging.ERROR)

@@ -34,27 +34,14 @@ MOST_BYTES, MOST_PARTS = 2**27, 2000
 
 
 class Shape(NamedTuple):
-    """A mesh that moves with a frame of an arm.
+    """A mesh that moves with a frame of an arm."""
 
-    Attributes:
-        frame: Number of the frame: 0 for the base, then one for each joint.
-        mesh: A `trimesh.Trimesh`, in that frame.
-    """
-
-    frame: int
-    mesh: Any
+    frame: int  # number of the frame: 0 for the base, then one for each joint
+    mesh: Any  # a `trimesh.Trimesh`, in that frame
 
 
 class DrawnArm:
-    """An arm in the scene: joints in the colour of their limits, a ball at the tool in that of the manipulability.
-
-    Args:
-        server: The server of viser.
-        root: The name of the frame of its base.
-        arm: The arm.
-        colour: The colour of the links.
-        shapes: Meshes of :func:`read_urdf`; cylinders if left out.
-    """
+    """An arm in the scene: joints in the colour of their limits, a ball at the tool in that of the manipulability."""
 
     def __init__(self, server: Any, root: str, arm: Arm, colour: Colour, shapes: list[Shape] | None = None) -> None:
         self._scene, self._arm = server.scene, arm
@@ -115,12 +102,7 @@ def joint_frames(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
-    """A model whose meshes are read within bounds.
-
-    Args:
-        robot: The content of the URDF file.
-        folder: The folder of the file; meshes are searched for where the file says.
-    """
+    """A model whose meshes are read within bounds."""
 
     def __init__(self, robot: Any, folder: pathlib.Path) -> None:
         self._left = MOST_BYTES

@@ -21,14 +21,7 @@ PLATE = 0.54
 
 
 class DrawnBodies:
-    """The bodies of one arm, which move with its frames, and the obstacles around it.
-
-    Args:
-        server: The server of viser.
-        links: Names of the frames of the arm, that of its base first.
-        stage: The episode.
-        colour: The colour of the bodies.
-    """
+    """The bodies of one arm, which move with its frames, and the obstacles around it."""
 
     def __init__(self, server: Any, links: Sequence[str], stage: Stage, colour: Colour) -> None:
         self._scene, bodies, root = server.scene, stage.scenario.arm.bodies, links[0]
@@ -53,12 +46,7 @@ class DrawnBodies:
             handle.visible = on
 
     def show(self, found: Closest, obstacles: FloatArray) -> None:
-        """Moves the obstacles and the line; the bodies move with the arm.
-
-        Args:
-            found: The closest pair.
-            obstacles: The obstacles. Shape (o, 16).
-        """
+        """Moves the obstacles (o, 16), and the line between the closest pair; the bodies move with the arm."""
         boxes = bounded(obstacles, self._edge)
         for number in np.flatnonzero((boxes != self._boxes).any(axis=1)).tolist():
             _move(self._obstacles[number], boxes[number])

@@ -28,21 +28,12 @@ MOST_PICTURES = 100_000
 
 
 def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
-    """The steps that are drawn, from the start to the end of the episode.
+    """The steps that are drawn, from the start to the end of the episode. Shape (pictures,).
 
-    Args:
-        stage: The episode.
-        fps: Pictures a second.
-        speed: Seconds of the episode in one second of the video.
-
-    Returns:
-        Numbers of steps, rising. Shape (pictures,).
-
-    Raises:
-        InvalidInputError: One of them is outside its range, or there would be too many pictures.
+    `speed` is how many seconds of the episode one second of the video shows.
     """
     steps = stage.scenario.steps
-    between = number("speed", speed, above=0.0) / checked_fps(fps) / stage.scenario.dt
+    between = number("speed", speed, above=0.0) / number("fps", fps, at_least=0.1, at_most=1000.0) / stage.scenario.dt
     if steps > MOST_PICTURES * between:
         raise InvalidInputError(
             f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {speed:g}."
@@ -50,21 +41,8 @@ def moments(stage: Stage, fps: float, speed: float) -> npt.NDArray[np.int64]:
     return np.append(np.rint(np.arange(0.0, steps, between)), steps).astype(np.int64)
 
 
-def checked_fps(fps: float) -> float:
-    """Pictures a second.
-
-    Raises:
-        InvalidInputError: They are not from 0.1 to 1000.
-    """
-    return number("fps", fps, at_least=0.1, at_most=1000.0)
-
-
 def checked_width(width: int) -> int:
-    """A width of pictures in [px].
-
-    Raises:
-        InvalidInputError: It is no multiple of 4 from 480 to 3840.
-    """
+    """A width of pictures in [px]."""
     if whole_number("width", width, at_least=NARROWEST, at_most=WIDEST) % STEP:
         raise InvalidInputError(f"width: expected a multiple of {STEP} from {NARROWEST} to {WIDEST} [px], got {width}.")
     return width
@@ -72,12 +50,6 @@ def checked_width(width: int) -> int:
 
 def pictures(stage: Stage, replays: Sequence[Replay], steps: npt.NDArray[np.int64], *, width: int) -> Iterator[Picture]:
     """Draws an episode.
-
-    Args:
-        stage: The episode.
-        replays: The replays of the policies.
-        steps: Which steps are drawn, rising.
-        width: Of one policy's picture in [px], see :func:`checked_width`.
 
     Yields:
         Pictures with the policies in two columns, row by row, white where one is missing. Shape (height, width, 3).
@@ -121,16 +93,7 @@ def check_ffmpeg() -> None:
 
 
 def write_video(file: pathlib.Path, content: Iterable[Picture], fps: float) -> None:
-    """Writes pictures as an H.264 video, in one go when all of them are drawn.
-
-    Args:
-        file: Where to write, ending in ``.mp4``.
-        content: The pictures, all of one even size.
-        fps: Pictures a second.
-
-    Raises:
-        ResultsError: The file cannot be written, or ffmpeg has failed.
-    """
+    """Writes pictures of one even size as an H.264 video ``.mp4``, in one go when all of them are drawn."""
     from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter
 
     left = iter(content)

@@ -66,12 +66,7 @@ class Approach:
 class Follower:
     """One policy and its arm, which moves as commanded within the limits: q(k+1) = q(k) + Δt q̇(k).
 
-    The policy keeps its own model of the arm; sensors and drives are ideal.
-
-    Args:
-        scenario: The scenario of the policy.
-        policy: The policy.
-        q: Joint coordinates at the start, in [rad] or [m]. Shape (n,).
+    The policy keeps its own model of the arm; sensors and drives are ideal. It starts at q in [rad] or [m] (n,).
     """
 
     def __init__(self, scenario: Scenario, policy: SolverPolicy, q: FloatArray) -> None:

@@ -24,30 +24,18 @@ POSTURES = 512
 
 
 class Reading(NamedTuple):
-    """The readings of a posture.
+    """The readings of a posture."""
 
-    Attributes:
-        manipulability: Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation.
-        share: The same as a share of the largest among random postures, between 0 and 1.
-        margins: Distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,).
-        joints: Colours of the n joints: ``FREE``, ``NEAR`` or ``AT``.
-        tool: Colour of the tool: from vermilion in a singular posture to bluish green in the best one.
-    """
-
-    manipulability: float
-    share: float
+    manipulability: float  # Yoshikawa's w = √det(J Jᵀ), of the linear rows where the task has no orientation
+    share: float  # the same as a share of the largest among random postures, between 0 and 1
+    # distances of the joints from their nearest limit in [rad] or [m], inf without limits. Shape (n,)
     margins: FloatArray
-    joints: list[Colour]
-    tool: Colour
+    joints: list[Colour]  # colours of the n joints: ``FREE``, ``NEAR`` or ``AT``
+    tool: Colour  # colour of the tool: from vermilion in a singular posture to bluish green in the best one
 
 
 class Reader:
-    """Computes the readings of one arm.
-
-    Args:
-        arm: The arm.
-        task: The task, which selects rows of the Jacobian.
-    """
+    """Computes the readings of one arm; the task selects rows of the Jacobian."""
 
     def __init__(self, arm: Arm, task: Task) -> None:
         self._arm, self._rows = arm, 6 if task.has_orientation and arm.joints >= 6 else 3
@@ -74,10 +62,9 @@ class Reader:
 
 
 def slider_range(arm: Arm) -> tuple[FloatArray, FloatArray]:
-    """The range of the sliders: the joint limits; half a turn either way, or half the reach, without limits.
+    """Lowest and highest joint coordinates of the sliders, each of shape (n,): the joint limits.
 
-    Returns:
-        Lowest and highest joint coordinates in [rad] or [m], each of shape (n,).
+    Without limits half a turn either way, or half the reach.
     """
     usual = np.where(arm.prismatic, 0.5 * (arm.reach(np.zeros(arm.joints)) or 1.0), np.pi)
     return (

@@ -37,38 +37,21 @@ def size(arm: Arm) -> float:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stage:
-    """An episode, before any policy plays it. Frames are the 9 numbers of a rotation and a position in [m].
+    """An episode, before any policy plays it. Frames are the 9 numbers of a rotation and a position in [m]."""
 
-    Args:
-        scenario: The scenario, cut to the steps that are shown.
-        seed: The reset seed.
-        start: Joint coordinates at the start, in [rad] or [m]. Shape (n,).
-        frames: The reference; its rotation is that of the tool at the start if the task has none. (steps + 1, 12).
-        errors: Errors of position in [m] and of orientation in [rad] at the start.
-        pace: Largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's
-            own reference, in [rad] the angle that :meth:`ikgym.arms.Arm.inverse` weighs equally.
-    """
-
-    scenario: Scenario
+    scenario: Scenario  # the scenario, cut to the steps that are shown
     seed: int
-    start: FloatArray
+    start: FloatArray  # joint coordinates at the start, in [rad] or [m]. Shape (n,)
+    # the reference; its rotation is that of the tool at the start if the task has none. (steps + 1, 12)
     frames: FloatArray
-    errors: tuple[float, float]
+    errors: tuple[float, float]  # errors of position in [m] and of orientation in [rad] at the start
+    # largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's own
+    # reference, in [rad] the angle that :meth:`ikgym.arms.Arm.inverse` weighs equally
     pace: tuple[float, float]
 
     @classmethod
     def of(cls, scenario: str | Scenario, seed: int = 0, steps: int | None = None) -> Stage:
-        """An episode of a scenario.
-
-        Args:
-            scenario: As :func:`ikgym.scenarios.find` takes it.
-            seed: The reset seed.
-            steps: Most steps; the scenario's own if left out.
-
-        Raises:
-            UnknownNameError: There is no such scenario.
-            InvalidInputError: The seed or the number of steps is not valid.
-        """
+        """An episode of a scenario as :func:`ikgym.scenarios.find` takes it; all of its steps if they are left out."""
         whole = shown = scenarios.find(scenario)
         if steps is not None:
             shown = whole.replace(steps=min(whole_number("steps", steps, at_least=1), whole.steps))
@@ -104,32 +87,19 @@ class Stage:
 
 
 class Replay(NamedTuple):
-    """The episode of one policy; row 0 is the start, row k the state after step k.
-
-    Attributes:
-        policy: The name of the policy.
-        q: True joint coordinates in [rad] or [m]. Shape (steps + 1, n).
-        position_error: In [m]. Shape (steps + 1,).
-        orientation_error: In [rad], NaN where the task has no orientation. Shape (steps + 1,).
-        cost: Accumulated cost. Shape (steps + 1,).
-        statuses: Values of :class:`baselines.Status`; row 0 repeats the first step. Shape (steps + 1,).
-    """
+    """The episode of one policy; row 0 is the start, row k the state after step k."""
 
     policy: str
-    q: FloatArray
-    position_error: FloatArray
-    orientation_error: FloatArray
-    cost: FloatArray
+    q: FloatArray  # true joint coordinates in [rad] or [m]. Shape (steps + 1, n)
+    position_error: FloatArray  # in [m]. Shape (steps + 1,)
+    orientation_error: FloatArray  # in [rad], NaN where the task has no orientation. Shape (steps + 1,)
+    cost: FloatArray  # accumulated cost. Shape (steps + 1,)
+    # values of :class:`baselines.Status`; row 0 repeats the first step. Shape (steps + 1,)
     statuses: npt.NDArray[np.int64]
 
 
 def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
-    """Plays the episode with each policy once, with a bar on a terminal.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: There is no policy, one does not suit the scenario, or a parameter is refused.
-    """
+    """Plays the episode with each policy once, with a bar on a terminal."""
     if not policies:
         raise InvalidInputError("policy: expected at least one, got none.")
     wanted, replays = list(dict.fromkeys(policies)), []

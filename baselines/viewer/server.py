@@ -38,13 +38,7 @@ LEGEND = (
 
 
 class Viewer:
-    """A session in the browser: the scene, and a panel with controls and readings beside it.
-
-    Args:
-        server: The server of viser.
-        session: The session.
-        shapes: Meshes of the arm; cylinders if left out.
-    """
+    """A session in the browser: the scene with meshes or cylinders, and a panel with controls and readings."""
 
     def __init__(self, server: Any, session: Session, shapes: list[Shape] | None = None) -> None:
         self.session, gui, stage = session, server.gui, session.stage
@@ -123,11 +117,7 @@ class Viewer:
 
 @contextlib.contextmanager
 def serving(host: str, port: int) -> Iterator[Any]:
-    """A server of viser on a port, 0 for a free one; stopped at the end.
-
-    Raises:
-        InvalidInputError: It cannot listen there.
-    """
+    """A server of viser on a port, 0 for a free one; stopped at the end."""
     server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
     try:
         yield server
@@ -145,11 +135,7 @@ def serving(host: str, port: int) -> Iterator[Any]:
 
 
 def free_port(host: str, port: int) -> int:
-    """The port, if it is free, or a free one for 0: viser would silently take the next one.
-
-    Raises:
-        InvalidInputError: It cannot be listened on.
-    """
+    """The port, if it is free, or a free one for 0: viser would silently take the next one."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         try:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -33,40 +33,20 @@ class Mode(enum.Enum):
 
 
 class Shown(NamedTuple):
-    """The arm of one policy at one time.
-
-    Attributes:
-        policy: The name of the policy.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        position_error: Distance from the reference in [m], NaN without one.
-        orientation_error: Angle in [rad], NaN also if the task has no orientation.
-        cost: Accumulated cost of the episode, NaN outside of it.
-        status: Status of the policy's last step.
-        reading: Manipulability and limits.
-        closest: The closest pair of bodies and obstacles.
-    """
+    """The arm of one policy at one time."""
 
     policy: str
-    q: FloatArray
-    position_error: float
-    orientation_error: float
-    cost: float
-    status: str
-    reading: Reading
-    closest: Closest
+    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (n,)
+    position_error: float  # distance from the reference in [m], NaN without one
+    orientation_error: float  # angle in [rad], NaN also if the task has no orientation
+    cost: float  # accumulated cost of the episode, NaN outside of it
+    status: str  # status of the policy's last step
+    reading: Reading  # manipulability and limits
+    closest: Closest  # the closest pair of bodies and obstacles
 
 
 class Session:
-    """The state of the viewer; all policies play the episode when it is made.
-
-    Args:
-        stage: The episode.
-        policies: Names of policies, as the command line takes them.
-
-    Raises:
-        UnknownNameError: There is no such policy or parameter.
-        InvalidInputError: There is no policy, or one does not suit the scenario.
-    """
+    """The state of the viewer; all policies, named as on the command line, play the episode when it is made."""
 
     def __init__(self, stage: Stage, policies: Sequence[str]) -> None:
         self.stage, self.replays = stage, play_all(stage, policies)

@@ -55,8 +55,7 @@ DIR/data appears in one go when all episodes are written."""
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line: words after the command, or those of the process; returns the exit code."""
-    program = "ikgym dataset"
-    return shell.run_resumable(Options, arguments, program, manual, _work, RULES)
+    return shell.run_resumable(Options, arguments, "ikgym dataset", manual, _work, RULES)
 
 
 def _work(options: Options, _: str) -> None:

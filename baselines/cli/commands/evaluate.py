@@ -44,11 +44,7 @@ class Arguments(Options):
                 object.__setattr__(self, name, value)
 
     def played(self) -> list[Scenario]:
-        """The scenarios, those of test sets included.
-
-        Raises:
-            UnknownNameError: There is no such scenario or test set.
-        """
+        """The scenarios, those of test sets included."""
         names = scenarios.names() if "all" in self.scenarios else self.scenarios
         return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in self.test_sets)]
 
@@ -60,7 +56,7 @@ def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
 #: Processes of this machine, or a cluster.
 ONE_KIND = Rule(("--workers",), lambda given: given.cluster is None, "with --cluster")
 RULES = (
-    Rule(("--resume", "--overwrite", "--plots", "--report"), lambda given: given.out is not None, "without --out"),
+    Rule(("--resume", "--overwrite", "--report"), lambda given: given.out is not None, "without --out"),
     Rule(
         ("--episodes", "--split", "--steps", "--noise-seeds"),
         lambda given: not given.test_sets,
@@ -102,7 +98,6 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   results.csv   the same as a table
   README.md     tables and conditions
   report.html   a table that sorts and filters, plots, and replays of the arms: open it in a browser
-  plots/        with --plots, for each scenario: errors and position, joint motion, cost against time
   series/       the data of the plots, as .npz
   export/       with --export, the joint motion of each episode
 
@@ -120,14 +115,7 @@ def _columns() -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The words after the command; those of the process if left out.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
+    """The command line: words after the command, or those of the process; returns the exit code."""
     program = shell.program("evaluate", "python -m baselines.evaluate")
     return shell.run_resumable(Arguments, arguments, program, manual, _work, RULES)
 

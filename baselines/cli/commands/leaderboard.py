@@ -35,9 +35,6 @@ class Options(Arguments):
     """Policies as those of evaluate. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 2
     """Episodes of each policy that are played alone and timed."""
-    plots: bool = False
-    """Draw the plots of evaluate, too."""
-
     fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"test_sets": (MAIN,)}
 
 
@@ -58,19 +55,7 @@ Files in DIR, besides those of evaluate:
 
 
 def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
-    """Writes the table and the plots.
-
-    Args:
-        rows: The results.
-        policies: The policies as text.
-        out: The folder.
-
-    Returns:
-        The table, as Markdown.
-
-    Raises:
-        ResultsError: The folder cannot be written.
-    """
+    """Writes the table and the plots into a folder; returns the table, as Markdown."""
     from baselines.evaluation.plots import comparison
     from baselines.evaluation.plots.style import png
 

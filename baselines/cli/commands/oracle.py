@@ -100,17 +100,9 @@ found before Ctrl-C are kept."""
 
 
 def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence[int]) -> list[SeededScenario]:
-    """The episodes to be searched.
+    """The episodes to be searched; seeds are those of the random scenarios.
 
-    Args:
-        scenarios: Names of scenarios.
-        test_sets: Names of test sets. If neither these nor scenarios are given: all fixed scenarios and all sets but
-            those with collisions, in which a search takes minutes an episode.
-        seeds: Reset seeds of the random scenarios.
-
-    Raises:
-        UnknownNameError: There is no such scenario or test set.
-        InvalidInputError: Seeds are missing or have no random scenario; a test set has drifted.
+    If nothing is named: all fixed scenarios and all sets, except those with collisions: a search there takes minutes.
     """
     named = [scenario_registry.get(name) for name in scenarios]
     drawn = any(map(_drawn, named))
@@ -138,22 +130,9 @@ def _drawn(scenario: Scenario) -> bool:
 
 
 def optima(
-    todo: Sequence[SeededScenario],
-    how: Search,
-    policies: Sequence[str] = (),
-    *,
-    cache: bool,
-    workers: Workers = ALONE,
+    todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool, workers: Workers = ALONE
 ) -> Iterator[tuple[Scenario, Seeds, Optimum]]:
-    """Searches episodes, with a bar on stderr, and yields each as soon as it is done.
-
-    Args:
-        todo: The episodes.
-        how: Settings of the search.
-        policies: Policies whose paths are further starts.
-        cache: Whether to read and write the cache on disk.
-        workers: The workers.
-    """
+    """Searches episodes, with a bar on stderr, and yields each as soon as it is done."""
     wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
     check_policies(wanted)
     with tqdm(
@@ -209,10 +188,9 @@ def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -
     return None
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line, by default the process's; returns the exit code: 1 if a record fails the check."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    return shell.run(lambda: _carry_out(given), lambda: "Stopped. Optima that were found are kept.")
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code, 1 if a record fails the check."""
+    return shell.run(lambda: _carry_out(arguments), lambda: "Stopped. Optima that were found are kept.")
 
 
 def _carry_out(arguments: Sequence[str]) -> int:

@@ -135,10 +135,9 @@ Files in the folder of --out:
   papers.md            the same as tables, with how each claim was tested"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    return shell.run(lambda: _carry_out(given))
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code."""
+    return shell.run(lambda: _carry_out(arguments))
 
 
 def _carry_out(arguments: Sequence[str]) -> int:

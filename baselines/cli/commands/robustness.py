@@ -73,17 +73,7 @@ Files in DIR, besides those of evaluate:
 
 
 def at(name: str, knowledge: float, drives: float) -> Scenario:
-    """The scenario with its plant at two severities.
-
-    Args:
-        name: The name of the scenario, or its file.
-        knowledge: Severity of calibration, payload and camera.
-        drives: Severity of lag and delay.
-
-    Raises:
-        UnknownNameError: There is no such scenario.
-        InvalidInputError: Its plant is ideal or cannot be scaled, or a severity is below 0.
-    """
+    """The scenario with its plant at two severities: of calibration, payload and camera; of lag and delay."""
     base = scenarios.find(name)
     if base.plant.ideal:
         raise InvalidInputError(f"Scenario {base.name!r}: expected a plant that is not ideal.")
@@ -96,12 +86,7 @@ def at(name: str, knowledge: float, drives: float) -> Scenario:
 
 
 def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
-    """The rows with their cost ratios; best known costs that are not recorded are searched and cached.
-
-    Args:
-        rows: The results.
-        places: The scenarios by their names.
-    """
+    """The rows with their cost ratios; best known costs that are not recorded are searched and cached."""
     missing = {(row.scenario, row.seed): None for row in rows if row.cost_ratio is None}
     wanted = [Wanted(places[name], Seeds(seed), HOW) for name, seed in missing]
     found = {}

@@ -129,17 +129,8 @@ Agents are trained on the seeds of the split "train" and validated on those of "
 used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments; those of the process if left out.
-
-    Returns:
-        The exit code: 0; 1 where a repetition ends with other weights; 2 after an error, also in one of several seeds;
-        130 after Ctrl-C.
-    """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code, 1 if a repetition ends with other weights."""
     out: pathlib.Path | None = None
 
     def work() -> int:
@@ -166,11 +157,7 @@ def _program() -> str:
 
 
 def _require_extra() -> None:
-    """Checks for the packages that only training needs.
-
-    Raises:
-        MissingDependencyError: One is missing.
-    """
+    """Checks for the packages that only training needs."""
     missing = [
         name
         for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
@@ -181,13 +168,7 @@ def _require_extra() -> None:
 
 
 def parse(arguments: Sequence[str]) -> Command | ByRewards[Any] | Repeat:
-    """The command in a command line.
-
-    Raises:
-        UnknownNameError: There is no such method, preset or environment, or no option of the preset.
-        InvalidInputError: A value is refused, an option is unknown or has no effect, or there is no method.
-        SystemExit: With 0 after ``--help``.
-    """
+    """The command in a command line."""
     if not arguments:
         with contextlib.suppress(SystemExit):
             parse(["--help"])

@@ -59,8 +59,7 @@ Files:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line: words after the command, or those of the process; returns the exit code."""
-    program = "ikgym tune"
-    return shell.run_resumable(Options, arguments, program, manual, _work)
+    return shell.run_resumable(Options, arguments, "ikgym tune", manual, _work)
 
 
 def _work(options: Options, text: str) -> None:

@@ -58,9 +58,8 @@ Examples:
   {prog} --scenario varga7-fast --policy dls rhc rhc_foresight --speed 0.2 --width 1280 --out talk.mp4"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+def main(arguments: Sequence[str]) -> int:
+    """The command line: words after the command; returns the exit code."""
     return shell.run(lambda: _film(parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)))
 
 

@@ -58,17 +58,8 @@ Examples:
   {prog} --scenario lab.toml --policy qp --urdf lab.urdf"""
 
 
-def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = None) -> int:
-    """The command line.
-
-    Args:
-        arguments: The arguments of the command; taken from the process if left out.
-        stop: Ends the viewer when it is set; Ctrl-C always does.
-
-    Returns:
-        The exit code: 0, 2 after an expected error, 130 after Ctrl-C.
-    """
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
+def main(arguments: Sequence[str], stop: threading.Event | None = None) -> int:
+    """The command line: words after the command; runs until Ctrl-C or `stop`, and returns the exit code."""
 
     def work() -> int:
         options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
@@ -89,15 +80,7 @@ def main(arguments: Sequence[str] | None = None, stop: threading.Event | None = 
 
 
 def meshes(arm: Arm, file: pathlib.Path | None) -> Any:
-    """The meshes that an arm is shown with; None for cylinders.
-
-    Args:
-        arm: The arm.
-        file: A URDF file of the arm; the one that the arm was read from if left out.
-
-    Raises:
-        InvalidInputError: The given file does not describe the arm.
-    """
+    """The meshes in a URDF file, else in the one that the arm was read from; None for cylinders."""
     source = arm.urdf.file if file is None and arm.urdf is not None else file
     if source is None:
         return None

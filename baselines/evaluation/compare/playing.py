@@ -29,26 +29,15 @@ LAG, DELAY = 0.02, 2
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Comparison:
-    """What solvers do on a path.
+    """What solvers do on a path."""
 
-    Args:
-        dt: The control period in [s].
-        rows: Rows of all solvers, path by path.
-        recommendation: The solver to take.
-        notes: What else is to be known.
-    """
-
-    dt: float
-    rows: Sequence[Row]
-    recommendation: Recommendation
-    notes: Sequence[str]
+    dt: float  # the control period in [s]
+    rows: Sequence[Row]  # rows of all solvers, path by path
+    recommendation: Recommendation  # the solver to take
+    notes: Sequence[str]  # what else is to be known
 
     def table(self, width: int = report.WIDTH) -> str:
-        """Table, notes and recommendation as plain text.
-
-        Args:
-            width: Characters that a line may have. Columns that decide nothing are left out where they do not fit.
-        """
+        """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""
         follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
         lines = summarise(self.rows)
         columns = fitting((*COLUMNS, follows), lines, width)

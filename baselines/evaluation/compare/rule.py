@@ -22,19 +22,12 @@ Rows = Mapping[str, Row]
 
 @dataclasses.dataclass(frozen=True)
 class Recommendation:
-    """A solver for a path.
+    """A solver for a path."""
 
-    Args:
-        solver: Its name; None where no solver follows the path.
-        retimed: Whether it follows the retimed path alone.
-        late: Whether it follows with late drives, too.
-        reason: Why this one.
-    """
-
-    solver: str | None
-    retimed: bool
-    late: bool
-    reason: str
+    solver: str | None  # its name; None where no solver follows the path
+    retimed: bool  # whether it follows the retimed path alone
+    late: bool  # whether it follows with late drives, too
+    reason: str  # why this one
 
     def __str__(self) -> str:
         if self.solver is None:
@@ -44,12 +37,7 @@ class Recommendation:
 
 
 def fault(row: Row, dt: float) -> str:
-    """Why a solver does not follow a path; empty where it does.
-
-    Args:
-        row: Its row.
-        dt: The control period in [s].
-    """
+    """Why the solver of a row does not follow a path with the control period dt in [s]; empty where it does."""
     if not row.followed:
         turned = row.orientation_error_max
         return f"errs by {1e3 * row.position_error_max:.3g} mm" + (f", {1e3 * turned:.3g} mrad" if turned else "")

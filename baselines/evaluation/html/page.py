@@ -54,17 +54,7 @@ COLUMNS = (
 
 
 def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> bytes:
-    """The report of a folder of results.
-
-    Args:
-        results: The folder.
-        skipped: Policies that were skipped.
-        command: The command of the evaluation.
-        date: When it finished.
-
-    Raises:
-        ResultsError: A trajectory log is damaged.
-    """
+    """The report of a folder of results."""
     from plotly.offline import get_plotlyjs  # slow to import, and not needed for rows
 
     rows = results.rows
@@ -91,15 +81,7 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
 
 
 def data(results: Results, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
-    """The data of the plots: costs, times and the thinned trajectory log of each summary.
-
-    Args:
-        results: The folder.
-        summaries: The lines of the table.
-
-    Raises:
-        ResultsError: A trajectory log is damaged.
-    """
+    """The data of the plots: costs, times and the thinned trajectory log of each line of the table."""
     logged = [one for one in summaries if results.series_file(one.first).exists()]
     return [
         {

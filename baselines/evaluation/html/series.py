@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.export import FRAMES, TrajectoryLog, frame_rows
+from baselines.evaluation.export import TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.obstacles.solids import bounded, in_space, surface
 from ikgym.validation import FloatArray
@@ -34,14 +34,13 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
         to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
         the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
         how many steps there were (``rows``), the limits, ``joint_names``, which joints are prismatic, and which points
-        are ends of joints (``joint_ends``). A log without frames has no data for a replay. Where the scenario has
-        collisions, the smallest ``clearance``, the ``closest`` points, the ``frames`` that carry bodies and obstacles,
-        and the surfaces of these, see :func:`_surfaces`.
+        are ends of joints (``joint_ends``). Where the scenario has collisions, the smallest ``clearance``, the
+        ``closest`` points, the ``frames`` that carry bodies and obstacles, and the surfaces of these, see
+        :func:`_surfaces`.
     """
-    frames = log.get("frame", frame_rows(len(log["time"]), FRAMES))
     carriers = log["carrier_frames"].shape[1] if "carrier_frames" in log else 0
-    picked = frame_rows(len(frames), max(FEWEST, size // _row_size(log["q"].shape[1], carriers)))
-    rows = frames[picked]
+    picked = frame_rows(len(log["frame"]), max(FEWEST, size // _row_size(log["q"].shape[1], carriers)))
+    rows = log["frame"][picked]
     starts = np.concatenate([[0], rows[:-1] + 1])
     arrays: dict[str, npt.NDArray[Any]] = {name: log[name][rows] for name in ("time", "q")}
     arrays["nominal"] = log["nominal"][rows][:, -3:]
@@ -50,13 +49,10 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
             arrays[name] = np.fmax.reduceat(log[name], starts)
     arrays |= {name: _largest(log[name], starts) for name in ("qdot", "qddot") if name in log}
     arrays["limit"] = np.maximum.reduceat(limits(log), starts)
-    out: dict[str, Any] = {
-        "rows": len(log["time"]),
-        **{name: log[name].tolist() for name in ("joint_names", "prismatic")},
-    }
-    if "joint_points" in log:
-        arrays["points"], out["joint_ends"] = _links(log, picked)
-        arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
+    out: dict[str, Any] = {name: log[name].tolist() for name in ("joint_names", "prismatic")}
+    out["rows"] = len(log["time"])
+    arrays["points"], out["joint_ends"] = _links(log, picked)
+    arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
     if carriers:
         arrays["clearance"] = np.fmin.reduceat(log["clearance"], starts)
         arrays["closest"] = log["closest"][picked].reshape(-1, 6)

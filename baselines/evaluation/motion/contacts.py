@@ -15,10 +15,6 @@ def contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
     """The columns of a row that state it, and its cost, see :class:`baselines.evaluation.metrics.Row`.
 
     None where nothing can meet.
-
-    Args:
-        scenario: The scenario.
-        episode: The record of the episode.
     """
     if episode.clearance is None or episode.pair is None or episode.stopped is None or episode.pair[0, 0] < 0:
         return {}

@@ -24,17 +24,11 @@ LONGER = (1, 2, 4)
 
 
 class PathScores(NamedTuple):
-    """How a path was followed.
+    """How a path was followed."""
 
-    Attributes:
-        time: When its end was reached, in [s]; None if it was not.
-        position_error: Largest distance from the reference at the policy's own progress, in [m].
-        orientation_error: Likewise, in [rad]; None for tasks whose coordinates are no angles.
-    """
-
-    time: float | None
-    position_error: float
-    orientation_error: float | None
+    time: float | None  # when its end was reached, in [s]; None if it was not
+    position_error: float  # largest distance from the reference at the policy's own progress, in [m]
+    orientation_error: float | None  # likewise, in [rad]; None for tasks whose coordinates are no angles
 
 
 def play_to_end(
@@ -46,19 +40,7 @@ def play_to_end(
     timed: bool,
     tick: Tick | None = None,
 ) -> list[Episode]:
-    """Episodes that go on until the end of the path is reached, but at least for the steps of the scenario.
-
-    Args:
-        scenario: The scenario.
-        policy: A policy with free timing.
-        seeds: Seeds of the episodes.
-        preview: Steps ahead that the policy is shown.
-        timed: Whether the calls are timed.
-        tick: Reports progress; the steps of the scenario count.
-
-    Raises:
-        InvalidInputError: See :func:`rollouts`.
-    """
+    """Episodes that go on until the end of the path is reached, but at least for the steps of the scenario."""
     for factor in LONGER:
         longer = scenario.replace(steps=factor * scenario.steps)
         episodes = rollouts(longer, policy, seeds, preview=preview, timed=timed)
@@ -100,16 +82,7 @@ def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> PathScore
 
 
 def reference_at(scenario: Scenario, seeds: Seeds, progress: FloatArray) -> FloatArray:
-    """Task coordinates of the reference after fractions of steps.
-
-    Args:
-        scenario: The scenario.
-        seeds: Seeds of the episode.
-        progress: Steps of the reference. Shape (k,).
-
-    Returns:
-        Shape (k, m).
-    """
+    """Task coordinates (k, m) of the reference after fractions of steps (k,)."""
     points = scenario.points(1)  # the end may be passed by a fraction of a step
     times = np.interp(progress, np.arange(len(points)), points) * scenario.dt
     frames = scenario.episode(seeds.seed).frames(times, scenario.model)

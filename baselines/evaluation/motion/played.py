@@ -13,16 +13,11 @@ from ikgym.validation import FloatArray
 
 
 class Motion(NamedTuple):
-    """The joint motion of an episode, from its start.
+    """The joint motion of an episode, from its start."""
 
-    Attributes:
-        times: From 0, in [s]. Shape (steps + 1,).
-        q: Joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n).
-        qdot: Joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n).
-    """
-
-    times: FloatArray
-    q: FloatArray
+    times: FloatArray  # from 0, in [s]. Shape (steps + 1,)
+    q: FloatArray  # joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n)
+    # joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n)
     qdot: FloatArray
 
     @classmethod
@@ -39,13 +34,7 @@ class Motion(NamedTuple):
 
 
 def by_joint(arm: Arm, values: FloatArray, per: str = "") -> dict[str, FloatArray]:
-    """Columns of a table, named by joint and unit.
-
-    Args:
-        arm: The arm.
-        values: One column a joint. Shape (k, n).
-        per: Follows the unit of the joint coordinate, such as ``/s``.
-    """
+    """Columns of a table by joint and unit, of values (k, n); `per` follows the unit of the joint, such as ``/s``."""
     units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
     heads = [f"{name} [{unit}{per}]" for name, unit in zip(arm.joint_names, units, strict=True)]
     return dict(zip(heads, values.T, strict=True))

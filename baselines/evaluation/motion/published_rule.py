@@ -20,23 +20,14 @@ POSITION, ORIENTATION, TURN, TRAVEL = 1e-4, np.radians(0.1), np.radians(7.0), 0.
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """Errors, motions and clearance of a joint path at the waypoints of a problem.
+    """Errors, motions and clearance of a joint path at the waypoints of a problem."""
 
-    Args:
-        position: Largest error in [m].
-        orientation: Largest error in [rad].
-        turn: Largest motion of a revolute joint between two waypoints, in [rad].
-        travel: The same of a prismatic joint, in [m].
-        within: Whether the joints are within their limits.
-        clearance: Smallest signed distance between bodies in [m]; infinite where none can meet.
-    """
-
-    position: float
-    orientation: float
-    turn: float
-    travel: float
-    within: bool
-    clearance: float
+    position: float  # largest error in [m]
+    orientation: float  # largest error in [rad]
+    turn: float  # largest motion of a revolute joint between two waypoints, in [rad]
+    travel: float  # the same of a prismatic joint, in [m]
+    within: bool  # whether the joints are within their limits
+    clearance: float  # smallest signed distance between bodies in [m]; infinite where none can meet
 
     @property
     def followed(self) -> bool:

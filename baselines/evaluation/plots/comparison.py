@@ -26,13 +26,9 @@ CLOSE, EVEN = 300.0, 4.0
 
 
 def front(lines: Sequence[Record]) -> list[Record]:
-    """The Pareto front: lines that no other line beats in both 99th percentile of the time and cost ratio.
+    """The Pareto front, fast to slow: lines that no other beats in both 99th percentile of the time and cost ratio.
 
-    Args:
-        lines: Lines of one scenario; those without times, or with fewer episodes than others, are left out.
-
-    Returns:
-        From fast to slow.
+    Lines without times, or with fewer episodes than others, are left out.
     """
     most = max(int(line["episodes"]) for line in lines)
     timed = [line for line in lines if _timed(line) and int(line["episodes"]) == most]
@@ -51,10 +47,6 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
     """Excess cost against the 99th percentile of the time per call, with intervals and the Pareto front.
 
     All policies have a name in the legend if there are colours enough; else those of the front.
-
-    Args:
-        lines: Lines of one scenario.
-        title: Stands above the plot.
     """
     drawn = style.figure(4.6)
     axes = drawn.subplots()
@@ -78,13 +70,7 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
 
 
 def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
-    """Excess cost against foresight, with intervals; one panel per scenario.
-
-    Args:
-        lines: The lines.
-        title: Stands above the plot.
-        by: The column whose values are the series.
-    """
+    """Excess cost against foresight, with intervals: a panel per scenario, a series per value of the column `by`."""
     drawn = style.figure(3.4)
     scenarios = list(dict.fromkeys(line["scenario"] for line in lines))
     panels = drawn.subplots(1, len(scenarios), squeeze=False)[0]
@@ -107,11 +93,7 @@ def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
 
 
 def severity_map(lines: Sequence[Record]) -> Figure:
-    """Cost ratios over two severities of the plant, one panel per policy; below them the share of lost episodes.
-
-    Args:
-        lines: Lines with the columns `knowledge` and `drives`.
-    """
+    """Cost ratios over two severities of the plant, one panel per policy; below them the share of lost episodes."""
     policies = list(dict.fromkeys(str(line["policy"]) for line in lines))
     across = min(len(policies), 2)
     down = -(-len(policies) // across)

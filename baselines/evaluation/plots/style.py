@@ -27,12 +27,7 @@ LETTERS, LINE = 115, 10  # small ones that fit the width, and those that a legen
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure, without pyplot, which needs a window system and keeps figures alive.
-
-    Args:
-        height: In [in].
-        width: In [in].
-    """
+    """An empty figure in [in], without pyplot, which needs a window system and keeps figures alive."""
     out = Figure(figsize=(width, height), dpi=DPI, layout=ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.06))
     FigureCanvasAgg(out)
     return out
@@ -54,11 +49,6 @@ def small_png(drawn: Figure) -> bytes:
     out = io.BytesIO()
     PIL.Image.open(io.BytesIO(png(drawn))).convert("RGB").quantize(256).save(out, format="png", optimize=True)
     return out.getvalue()
-
-
-def literal(text: str) -> str:
-    """A text that matplotlib shows letter by letter: a formula between dollars in a name may be none."""
-    return text.replace("$", r"\$")
 
 
 def dress(axes: Axes, *, ylabel: str, xlabel: str = "", title: str = "", ticks: int = 8) -> None:

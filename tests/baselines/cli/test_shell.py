@@ -58,9 +58,3 @@ def test_names_of_programs(monkeypatch):
     assert shell.program("evaluate", "python -m baselines.evaluate") == "ikgym evaluate"
     monkeypatch.setattr(sys, "argv", ["/somewhere/baselines/evaluate.py"])
     assert shell.program("evaluate", "python -m baselines.evaluate") == "python -m baselines.evaluate"
-
-
-def test_width(monkeypatch):
-    for columns, width in {"60": 80, "80": 80, "101": 101}.items():
-        monkeypatch.setenv("COLUMNS", columns)
-        assert shell.width() == width

@@ -63,14 +63,11 @@ def test_a_row_has_the_smallest_clearance_where_nothing_stops(rows):
     assert row.closest_step == found.distances.argmin() + 1
 
 
-def test_other_scenarios_have_no_such_values(rows):
-    assert [getattr(rows[0][2], name) for name in COLUMNS] == [None] * 4
-
-
 def test_rows_are_read_again_also_those_of_before(rows):
     _, folder = rows
     file = folder / "results.json"
     assert read_rows(file) == list(rows[0])
+    assert [getattr(rows[0][2], name) for name in COLUMNS] == [None] * 4
     old = json.loads(file.read_text())[2:]
     for name in COLUMNS:
         del old[0][name]
@@ -132,15 +129,9 @@ def test_a_log_has_solids_and_closest_points(log):
     np.testing.assert_allclose(found["carrier_frames"][:, n + 2, 9:], ball[found["frame"]], atol=1e-6)
 
 
-@pytest.mark.parametrize("name", CONTACTS)
-def test_a_log_without_one_of_them_is_damaged(log, name):
+def test_a_log_without_one_of_them_is_damaged(log):
     with pytest.raises(ValueError, match="all or none of the arrays clearance, solids"):
-        check_log({key: values for key, values in log[1].items() if key != name})
-
-
-def test_a_log_with_a_carrier_that_is_not_there_is_damaged(log):
-    with pytest.raises(ValueError, match="numbers below 10 in the array carriers"):
-        check_log(log[1] | {"carriers": log[1]["carriers"] + 5})
+        check_log({key: values for key, values in log[1].items() if key != "carriers"})
 
 
 def test_a_series_has_surfaces_in_the_frames_that_carry_them(log):

@@ -20,33 +20,6 @@ from ikgym.exceptions import MissingDependencyError
 from tests.baselines.making import circle
 
 STEPS = 12
-#: Fields of trajectory_msgs/msg/JointTrajectory and JointTrajectoryPoint, and of what they are made of, with types.
-POINT = {
-    "positions": [float],
-    "velocities": [float],
-    "accelerations": [float],
-    "effort": [float],
-    "time_from_start": {"sec": int, "nanosec": int},
-}
-MESSAGE = {
-    "header": {"stamp": {"sec": int, "nanosec": int}, "frame_id": str},
-    "joint_names": [str],
-    "points": [POINT],
-}
-
-
-def check(value, shape, where="message"):
-    """Whether a value has the fields of a message, all of them and no others."""
-    if isinstance(shape, dict):
-        assert list(value) == list(shape), where
-        for key, inner in shape.items():
-            check(value[key], inner, f"{where}.{key}")
-    elif isinstance(shape, list):
-        assert isinstance(value, list), where
-        for i, part in enumerate(value):
-            check(part, shape[0], f"{where}[{i}]")
-    else:
-        assert type(value) is shape, where
 
 
 def named(**changes):
@@ -79,28 +52,18 @@ def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
     np.testing.assert_array_equal(table[0, 1:], [*scenario.start, *np.zeros(6)])
     np.testing.assert_array_equal(table[1:, 1:7], track.q)
     np.testing.assert_array_equal(table[1:, 7:], track.qdot)
-    np.testing.assert_allclose(np.diff(table[:, 1:7], axis=0), scenario.dt * table[1:, 7:], atol=1e-15)
+    evaluate(circle("tiago", steps=3), "dls", out=tmp_path / "tiago", export=["csv", "csv"])
+    (name,) = files(tmp_path / "tiago")
+    head, _ = read_csv(tmp_path / "tiago" / "export" / name)
+    assert [head[1], head[2], head[9]] == ["torso_lift_joint [m]", "arm_1_joint [rad]", "torso_lift_joint [m/s]"]
 
 
-def test_units_of_prismatic_joints(tmp_path):
-    scenario = circle("tiago", steps=3)
-    baselines.track(scenario, "dls").to_joint_trajectory(tmp_path / "motion.json")
-    evaluate(scenario, "dls", out=tmp_path, export=["csv", "csv"])
-    (name,) = files(tmp_path)
-    head, _ = read_csv(tmp_path / "export" / name)
-    assert head[1:3] == ["torso_lift_joint [m]", "arm_1_joint [rad]"]
-    assert head[9] == "torso_lift_joint [m/s]"
-    written = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
-    assert written["joint_names"] == list(scenario.arm.joint_names)
-
-
-def test_joint_trajectory_is_a_whole_message(tmp_path):
+def test_joint_trajectory_starts_and_ends_at_rest_on_time(tmp_path):
     scenario = named(dt=0.3)
     evaluate(scenario, "dls", out=tmp_path, export="joint-trajectory")
     (name,) = files(tmp_path)
     text = (tmp_path / "export" / name).read_text(encoding="utf-8")
     content = json.loads(text)
-    check(content, MESSAGE)
     assert content["joint_names"] == [f"slider_{i}" for i in range(6)]
     points, track = content["points"], baselines.track(scenario, "dls")
     assert len(points) > STEPS + 1  # the episode ends in motion
@@ -110,7 +73,6 @@ def test_joint_trajectory_is_a_whole_message(tmp_path):
     times = [point["time_from_start"] for point in points]
     assert times[0] == {"sec": 0, "nanosec": 0}
     assert times[4] == {"sec": 1, "nanosec": 200_000_000}
-    assert all(0 <= time["nanosec"] < 10**9 for time in times)
     seconds = [time["sec"] + 1e-9 * time["nanosec"] for time in times]
     np.testing.assert_allclose(seconds, 0.3 * np.arange(len(points)), atol=1e-9)
     track.to_joint_trajectory(tmp_path / "again.json")
@@ -141,9 +103,11 @@ def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypat
     written = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
     assert connection.topic == "/joint_trajectory_controller/joint_trajectory"
     assert connection.msgtype == "trajectory_msgs/msg/JointTrajectory"
+    assert list(written) == ["header", "joint_names", "points"]  # no others, which `ros2 topic pub` would refuse
     assert read.joint_names == written["joint_names"]
     assert len(read.points) == len(written["points"])
     for point, other in zip(read.points, written["points"], strict=True):
+        assert len(other) == 5
         for key in ("positions", "velocities", "accelerations", "effort"):
             np.testing.assert_array_equal(getattr(point, key), other[key])
         assert {"sec": point.time_from_start.sec, "nanosec": point.time_from_start.nanosec} == other["time_from_start"]

@@ -5,7 +5,7 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import baselines
 import ikgym
@@ -17,7 +17,6 @@ from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, meas
 from baselines.evaluation.summary import summarise
 from baselines.files import from_json
 from baselines.recording import Episode, Seeds
-from baselines.statistics import Spread
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.limited import limited
@@ -41,23 +40,11 @@ def restored(values):
 
 
 def handmade(steps=4, **changes):
-    arrays = {
-        "q": np.zeros((steps, 3)),
-        "qdot": np.zeros((steps, 3)),
-        "pose": np.zeros((steps, 3)),
-        "tracking_cost": np.zeros(steps),
-        "velocity_cost": np.zeros(steps),
-        "position_error": np.zeros(steps),
-        "orientation_error": np.full(steps, np.nan),
-        "at_limit": np.zeros((steps, 3)),
-        "status": np.zeros(steps, dtype=np.int64),
-        "iterations": np.ones(steps, dtype=np.int64),
-        "time_ns": np.full(steps, 1000, dtype=np.int64),
-    }
-    return Episode(
-        diagnostics={},
-        **{**arrays, **{k: np.asarray(v) for k, v in changes.items()}},
-    )
+    arrays = dict.fromkeys(("q", "qdot", "pose", "at_limit"), np.zeros((steps, 3)))
+    arrays |= dict.fromkeys(("tracking_cost", "velocity_cost", "position_error"), np.zeros(steps))
+    arrays |= {"orientation_error": np.full(steps, np.nan), "status": np.zeros(steps, dtype=np.int64)}
+    arrays |= {"iterations": np.ones(steps, dtype=np.int64), "time_ns": np.full(steps, 1000, dtype=np.int64)}
+    return Episode(diagnostics={}, **arrays | {name: np.asarray(values) for name, values in changes.items()})
 
 
 def position_scenario(steps=4, **changes):
@@ -66,12 +53,7 @@ def position_scenario(steps=4, **changes):
 
 @pytest.mark.parametrize(
     ("name", "steps", "seed", "policy"),
-    [
-        ("varga7-fast", 120, 0, "dls"),
-        ("varga7-random", 60, 2_000_001, "moore_penrose"),
-        ("zhang3-helix", 60, 0, "dls"),
-        ("khan8-q7q8", 150, 0, "dls"),
-    ],
+    [("varga7-random", 60, 2_000_001, "moore_penrose"), ("khan8-q7q8", 150, 0, "dls")],
 )
 def test_total_cost_is_the_sum_of_the_rewards_of_gymnasium_bit_for_bit(name, steps, seed, policy):
     which = scenario(name, steps=steps)
@@ -126,33 +108,6 @@ def test_a_joint_at_its_limit_counts_though_its_policy_keeps_the_limit():
     assert row.steps_at_velocity_limit == (shown == VELOCITY).any(axis=1).sum() > 20
     assert row.steps_at_acceleration_limit >= (shown == ACCELERATION).any(axis=1).sum() > 20
     assert not row.followed
-
-
-def test_the_warm_up_call_leaves_no_trace_in_the_episode():
-    which = scenario(steps=20)
-    solver = baselines.make("rhc_gradient", which)
-    calls = []
-
-    class Counting:
-        preview = solver.preview
-        commands = 0
-        batched = True
-        report = staticmethod(solver.report)
-        diagnostics = staticmethod(solver.diagnostics)
-
-        def predict(self, observation, state=None):
-            calls.append(state)
-            answer = solver.predict(observation, state)
-            if len(calls) == 1:
-                observation["q"][:] = observation["nominal"][:] = 99.0  # what is warmed up with is a copy
-            return answer
-
-    episode = rollout(which, Counting(), 0)
-    assert len(calls) == 21
-    assert calls[0] is None
-    assert calls[1] is None
-    assert all(state is not None for state in calls[2:])
-    assert_array_equal(episode.qdot, rollout(which, solver, 0).qdot)
 
 
 def test_metrics_equal_a_plain_numpy_computation():
@@ -252,10 +207,9 @@ def test_what_was_not_timed_has_no_times():
     assert [neither.largest(name) for name in TIME_COLUMNS] == [None] * 4
 
 
-@pytest.mark.parametrize("test_set", [None, "0123456789ab"])
-def test_a_row_survives_json(test_set):
+def test_a_row_survives_json():
     parameters = {"damping": 1e-3, "rule": "a", "weights": [1, 2]}
-    row = row_of(position_scenario(), handmade(), parameters=parameters, test_set=test_set)
+    row = row_of(position_scenario(), handmade(), parameters=parameters, test_set="0123456789ab")
     there = json.loads(json.dumps(row.to_json(), allow_nan=False))
     assert list(there) == [field.name for field in dataclasses.fields(Row)]
     assert restored(there) == row
@@ -263,39 +217,6 @@ def test_a_row_survives_json(test_set):
     there = dataclasses.replace(row, total_cost=math.inf).to_json()
     assert there["total_cost"] is None
     assert math.isnan(restored(there).total_cost)
-
-
-def test_summaries():
-    base = row_of(position_scenario(), handmade())
-    rows = [
-        dataclasses.replace(
-            base,
-            seed=seed,
-            total_cost=cost,
-            tracking_cost=cost,
-            position_error_max=error,
-            time_p50_us=time,
-            time_p99_us=2 * time,
-            deadline_misses=seed,
-            solver_status=status,
-            followed=error < 0.2,
-        )
-        for seed, cost, error, time, status in (
-            (1, 1.0, 0.3, 5.0, "converged"),
-            (2, 100.0, 0.1, 7.0, "rank_deficient"),
-            (3, 10.0, 0.2, 6.0, "iteration_limit"),
-        )
-    ]
-    other = dataclasses.replace(base, policy="moore_penrose")
-    first, second = summarise([*rows, other])
-    assert (first.label, second.label) == ("dls", "moore_penrose")
-    assert first.episodes == 3
-    assert first.total_cost == Spread(pytest.approx(10.0), 10.0, pytest.approx(82.0), 100.0, 2)
-    assert first.largest("position_error_max") == 0.3
-    assert first.largest("orientation_error_max") is None
-    assert (first.median("time_p50_us"), first.largest("time_p99_us"), first.total("deadline_misses")) == (6.0, 14.0, 6)
-    assert (first.solver_status, first.followed) == ("rank_deficient", 1)
-    assert first.cost_ratio is None
 
 
 @pytest.mark.parametrize("change", [{"fingerprint": "g"}, {"test_set": "0123456789ab"}])
@@ -307,37 +228,14 @@ def test_rows_of_different_content_are_not_put_together(change):
     assert len(summarise([base, dataclasses.replace(other, scenario="another")])) == 2
 
 
-@pytest.mark.parametrize(
-    ("position", "angle", "expected"),
-    [
-        (1e-3, 1e-3, True),
-        (1e-3, None, True),
-        (1.01e-3, None, False),
-        (0.0, 1.01e-3, False),
-        (math.nan, 0.0, False),
-        (0.0, math.nan, False),
-    ],
-)
-def test_followed_by_position_and_orientation(position, angle, expected):
-    assert followed(position, angle) is expected
-    row = row_of(position_scenario(), handmade(position_error=[0.0, 0.0, position, 0.0]))
-    assert row.followed is followed(position, None)
-
-
-@pytest.mark.parametrize(
-    ("position", "angle", "expected"),
-    [
-        (0.05, 0.3, False),
-        (0.0, 0.301, True),
-        (0.0501, None, True),
-        (math.nan, 0.0, True),
-        (0.0, math.nan, True),
-    ],
-)
-def test_lost_by_position_or_orientation(position, angle, expected):
-    assert lost(position, angle) is expected
-    row = row_of(position_scenario(), handmade())
-    row = dataclasses.replace(row, position_error_max=position, orientation_error_max=angle)
-    assert row.lost is expected
-    (summary,) = summarise([row, dataclasses.replace(row, seed=77, position_error_max=9.0)])
-    assert summary.lost == 1 + expected
+def test_followed_and_lost_by_position_or_orientation():
+    """NaN is lost and not followed."""
+    small, nan = (1e-3, 1e-3), math.nan
+    assert all(followed(*errors) for errors in (small, (1e-3, None)))
+    assert not any(followed(*errors) for errors in ((1.01e-3, None), (0.0, 1.01e-3), (nan, 0.0), (0.0, nan)))
+    assert not lost(0.05, 0.3)
+    assert all(lost(*errors) for errors in ((0.0, 0.301), (0.0501, None), (nan, 0.0), (0.0, nan)))
+    rows = [row_of(position_scenario(), handmade(position_error=[0.0, 0.0, e, 0.0])) for e in (1e-3, 0.01, 0.06, nan)]
+    assert [row.followed for row in rows] == [True, False, False, False]
+    assert [row.lost for row in rows] == [False, False, True, True]
+    assert summarise([dataclasses.replace(row, seed=seed) for seed, row in enumerate(rows)])[0].lost == 2

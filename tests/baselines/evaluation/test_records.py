@@ -45,8 +45,6 @@ class TestRecords:
         (line,) = records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))])
         assert (line["policy"], line["seeds"], line["episodes"]) == ("apg", 2, 2)
         assert line["cost_ratio"] == pytest.approx(2.0)
-
-    def test_training_seeds_play_the_same_episodes(self, row):
         with pytest.raises(InvalidInputError, match="apg: expected the same episodes"):
             records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
 
@@ -56,19 +54,15 @@ class TestRecords:
         assert [line["relative_to"] for line in lines] == [records.LOWEST] * 2
         assert [line["cost_ratio"] for line in lines] == pytest.approx([np.sqrt(2.0), 2.0])
 
-    def test_labels_are_the_policies_as_given(self, row):
-        given = ["rhc:horizon=3", "rhc:horizon=3,iterations=1"]
+    def test_labels_are_the_policies_as_given_with_the_options_of_inner_ones(self, row):
+        given = ["rhc:horizon=3", "rhc:horizon=3,iterations=1", "smoothed:options={'horizon': 3}"]
+        given.append("smoothed:options={'horizon': 9}")
         plain, short = ({"horizon": 3, "iterations": iterations} for iterations in (None, 1))
-        rows = [*episodes(row, (2.0,), policy="rhc", parameters=plain)]
-        rows += episodes(row, (3.0,), policy="rhc", parameters=short)
-        assert [line["policy"] for line in records.records(rows, given)] == given
-
-    def test_the_options_of_an_inner_policy_tell_lines_apart(self, row):
-        given = ["smoothed:options={'horizon': 3}", "smoothed:options={'horizon': 9}"]
+        inner = [{"options": {"horizon": horizon, "iterations": 1}} for horizon in (3, 9)]
         rows = []
-        for cost, horizon in ((2.0, 3), (3.0, 9)):
-            parameters = {"options": {"horizon": horizon, "iterations": 1}}
-            rows += episodes(row, (cost,), policy="smoothed", parameters=parameters)
+        for cost, parameters in enumerate((plain, short, *inner), 2):
+            policy = "smoothed" if "options" in parameters else "rhc"
+            rows += episodes(row, (float(cost),), policy=policy, parameters=parameters)
         assert [line["policy"] for line in records.records(rows, given)] == given
 
 
@@ -92,7 +86,6 @@ class TestFiles:
             "| `c` | 2 | 1.000e9 | – | 100 |",
         ]
 
-    def test_columns(self):
         assert records.markdown(self.LINES, ["n", "policy"]).startswith("| n | policy |")
         with pytest.raises(InvalidInputError, match="expected some of policy, n"):
             records.markdown(self.LINES, ["m"])
@@ -106,6 +99,7 @@ class TestInterval:
         assert geometric_interval(values) == pytest.approx(tuple(expected), rel=0.02)
 
     def test_copies_of_a_seed_say_nothing_new(self):
+        assert (geometric_mean([0.0, 5.0]), geometric_mean([2.0, 8.0])) == (0.0, pytest.approx(4.0))
         one = np.random.default_rng(6).lognormal(size=(1, 64))
         assert geometric_interval(np.tile(one, (5, 1))) == pytest.approx(geometric_interval(one), rel=1e-12)
 
@@ -118,10 +112,6 @@ class TestInterval:
             low, high = geometric_interval(np.exp(logs))
             hits += low <= 1.0 <= high
         assert 0.88 <= hits / trials <= 0.985
-
-    def test_the_mean_of_a_zero_is_zero(self):
-        assert geometric_mean([0.0, 5.0]) == 0.0
-        assert geometric_mean([2.0, 8.0]) == pytest.approx(4.0)
 
 
 def line(policy, ratio, p99, **changes):

@@ -22,13 +22,11 @@ def test_the_sets_are_what_they_were(name):
     [
         ("varga7-pose-random", 2_000_063, (0.409194226944, -0.488632498827, 0.058888695021, -0.4727872721)),
         ("varga7-random", 2_000_000, (0.331915028534, 0.437288000971, 0.46396646241, -0.218935014377)),
-        ("varga7-random-long", 2_000_015, (-0.320635318762, 0.603603897137, 0.978702510455, -0.630827291228)),
         ("panda-random", 2_000_127, (0.782552705425, -1.422801591503, 0.798453720653, -2.931062047715)),
-        ("panda-ideal", 2_000_000, (-0.246768624713, -1.347738067527, 0.170552587934, -2.369878789443)),
-        ("iiwa14-random", 2_000_127, (0.782552705425, -0.132054177127, 0.798453720653, -1.969408227173)),
     ],
 )
 def test_seeds_draw_what_they_drew(name, seed, last):
+    """As numbers, for other machines than those of the digests."""
     assert seed in test_sets.SETS[name].seeds
     assert_allclose(scenarios.get(name).nominal_joint_path(seed)[-1, :4], last, rtol=0, atol=1e-9)
 
@@ -52,6 +50,4 @@ def test_a_frozen_set_is_played_as_it_is():
     assert {(job.scenario.name, job.scenario.steps, job.test_set) for job in jobs} == {
         ("varga7-random", 1000, test_sets.SETS["varga7-random"].digest)
     }
-    both = planned((), ["dls", "follow_nominal"], test_sets=test_sets.names()).jobs
-    assert len(both) == 2 * (256 + 32 + 64 + 16 + 3 * 128 + 4 * 64 + 3 * (3 * 64 + 65))
     assert all(job.test_set is None for job in planned("varga7-random", "dls").jobs)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import baselines
-import ikgym
 from baselines.paths import retime, survey
 from baselines.paths.motion import ideal, path_duration, played
 from baselines.paths.starts import starts
@@ -20,12 +19,17 @@ from ikgym.obstacles.solids import closest
 from tests.bodied import AROUND, POST, blocked, crowd
 
 
+def quick(obstacles):
+    """The whole path among obstacles, in few steps."""
+    return crowd(None, obstacles).replace(dt=4e-3)
+
+
 def distances(scenario, q):
     return closest(scenario.arm, q, scenario.obstacle_rows(1), scenario.surroundings.checked).distances
 
 
-def test_starts_are_clear():
-    free = crowd(None, (AROUND[0],))
+def test_starts_are_clear_and_the_clearance_is_that_of_the_motion():
+    free = quick(AROUND)
     every = starts(ideal(free))
     elbow = free.arm.joint_points(every[0])[3, 1]
     scenario = free.replace(obstacles=[*free.obstacles, Box("beam", elbow, [0.1, 0.1, 0.1])])
@@ -34,27 +38,23 @@ def test_starts_are_clear():
     assert len(found) > 1
     assert (distances(scenario, found) > 0.0).all()
     surveyed = survey(scenario)
-    best = surveyed.best
+    best, driven = surveyed.best, retime(surveyed).scenario
     assert best.whole
     assert best.contact.clearance > 0.0
     assert not best.contact.touched
-    driven = retime(surveyed).scenario
     assert driven.obstacles == scenario.obstacles
-    assert baselines.track(driven, "qp").position_error.max() < 1e-3
-
-
-def test_the_clearance_is_that_of_the_motion():
-    scenario = crowd(None, AROUND)
-    best = survey(scenario).best
-    q = baselines.track(scenario.replace(start=best.start), "qp").q
-    found = closest(scenario.arm, q, scenario.obstacle_rows(len(q) + 1)[1:], scenario.surroundings.checked)
-    assert best.contact.clearance == pytest.approx(found.distances.min(), abs=1e-4)
-    then = found.distances[round(best.contact.time / scenario.dt) - 1]
+    np.testing.assert_array_equal(driven.start, best.start)
+    tracking = baselines.track(driven, "qp")
+    assert tracking.position_error.max() < 1e-3
+    rows = scenario.obstacle_rows(len(tracking.q) + 1)[1:]
+    met = closest(scenario.arm, tracking.q, rows, scenario.surroundings.checked)
+    assert best.contact.clearance == pytest.approx(met.distances.min(), abs=1e-4)
+    then = met.distances[round(best.contact.time / scenario.dt) - 1]
     assert then == pytest.approx(best.contact.clearance, abs=1e-4)
 
 
 def test_a_path_that_no_start_leads_along_clear():
-    scenario = crowd(None, (AROUND[0], POST.replace(position=[0.52, 0.13, 0.3], size=[0.1, 0.1, 0.5])))
+    scenario = quick((AROUND[0], POST.replace(position=[0.52, 0.13, 0.3], size=[0.1, 0.1, 0.5])))
     found = survey(scenario)
     assert not found.best.whole
     assert not found.drivable
@@ -85,8 +85,3 @@ def test_a_first_pose_that_is_not_clear():
     scenario = crowd(None, (Box("block", position, [0.1, 0.1, 0.1]),))
     with pytest.raises(InvalidInputError, match=r"touches nothing, got none among \d+; .* and 'block' overlap by"):
         survey(scenario)
-
-
-def test_without_collisions_nothing_is_said():
-    scenario = ikgym.scenarios.get("panda-circle")
-    assert all(branch.contact is None for branch in survey(scenario).branches)

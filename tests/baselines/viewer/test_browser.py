@@ -1,4 +1,7 @@
-"""The viewer in a real browser: names from files are shown letter by letter, and nothing in them runs."""
+"""The viewer in a real browser: names from files are shown letter by letter, and nothing in them runs.
+
+Without a browser, :mod:`tests.baselines.evaluation.test_report` has them read by a parser of Markdown.
+"""
 
 import pytest
 
@@ -27,43 +30,37 @@ HOSTILE = (
 )
 
 
-@pytest.fixture(scope="module")
-def browser(serving):
-    del serving  # begins before playwright, and ends after it: both have a loop of their own
-    with chromium() as made:
-        yield made
-
-
-def scenario_of(name, folder):
-    """A scenario file of that name, with an arm of a URDF file whose joints have the name."""
-    toml, quoted = folder / "it.toml", name.replace("&", "&amp;").replace("<", "&lt;").replace("\n", "&#10;")
-    arm = ikgym.arms.get("panda")
+def scenario_of(names, folder):
+    """A scenario file of the first name, with an arm of a URDF file whose joints have the others."""
+    toml, arm = folder / "it.toml", ikgym.arms.get("panda")
     content = urdf(arm)
-    for joint, usual in enumerate(arm.joint_names, 1):
-        attribute = f"{quoted} {joint}".replace('"', "&quot;")
-        content = content.replace(f'"{usual}"', f'"{attribute}"')
+    for name, usual in zip(names[1:], arm.joint_names, strict=True):
+        quoted = name.replace("&", "&amp;").replace("<", "&lt;").replace("\n", "&#10;").replace('"', "&quot;")
+        content = content.replace(f'"{usual}"', f'"{quoted}"')
     (folder / "it.urdf").write_text(content)
     panda = ikgym.scenarios.get("panda-circle").replace(steps=2)
-    panda.replace(name=name, arm=ikgym.arms.from_urdf(folder / "it.urdf")).save(toml)
+    panda.replace(name=names[0], arm=ikgym.arms.from_urdf(folder / "it.urdf")).save(toml)
     return ikgym.scenarios.load(toml)
 
 
-@pytest.mark.parametrize("name", [HOSTILE[0], *(pytest.param(name, marks=pytest.mark.slow) for name in HOSTILE[1:])])
-def test_names_are_shown_and_do_not_run(name, browser, server, tmp_path):
-    stage = Stage.of(scenario_of(name, tmp_path))
-    viewer = servers.Viewer(server, Session(stage, ["dls"]))
+@pytest.mark.slow
+def test_names_are_shown_and_do_not_run(serving, tmp_path):
+    stage = Stage.of(scenario_of(HOSTILE, tmp_path))
+    viewer = servers.Viewer(serving, Session(stage, ["dls"]))
     viewer.session.place(stage.scenario.arm.upper)
     viewer.tick(1.0)  # the panel names the joint at its limit
-    tab, errors, foreign = browser.new_page(), [], []
-    tab.on("pageerror", lambda error: errors.append(str(error)))
-    tab.on("request", lambda request: foreign.append(request.url))
-    tab.goto(f"http://{HOST}:{server.get_port()}")
-    for part in ("[rad]", ", seed 0", " is 0 rad from its limit"):
-        tab.wait_for_function("text => document.body.innerText.includes(text)", arg=part, timeout=READY)
-    assert tab.evaluate("globalThis.ran") is None
-    text, line = tab.evaluate("document.body.innerText"), " ".join(name.split())
-    for part in (f"{line}, seed 0", f"{line} 1 is 0 rad from its limit", f"{line} 7 [rad]"):
+    errors, foreign = [], []
+    with chromium() as browser:  # begins after the server, and ends before it: both have a loop of their own
+        tab = browser.new_page()
+        tab.on("pageerror", lambda error: errors.append(str(error)))
+        tab.on("request", lambda request: foreign.append(request.url))
+        tab.goto(f"http://{HOST}:{serving.get_port()}")
+        for part in ("[rad]", ", seed 0", " is 0 rad from its limit"):
+            tab.wait_for_function("text => document.body.innerText.includes(text)", arg=part, timeout=READY)
+        assert tab.evaluate("globalThis.ran") is None
+        text = tab.evaluate("document.body.innerText")
+    scenario, *joints = (" ".join(name.split()) for name in HOSTILE)
+    for part in (f"{scenario}, seed 0", f"{joints[0]} is 0 rad from its limit", *(f"{one} [rad]" for one in joints)):
         assert part in text
     assert errors == []
     assert not [url for url in foreign if "127.0.0.1:9" in url or url.endswith("/x")]
-    tab.close()

@@ -51,14 +51,6 @@ def viewer(server):
     return servers.Viewer(server, Session(Stage.of("panda-circle", steps=20), ["dls", "qp"]))
 
 
-@pytest.fixture
-def browser(server, viewer):
-    with connect(f"ws://{HOST}:{server.get_port()}", max_size=None, max_queue=None) as connection:
-        made = Browser(connection)
-        wait_for(viewer, server.get_clients)
-        yield made
-
-
 def wait_for(viewer, condition):
     """Shows pictures in which no time passes until something has come about."""
     end = time.monotonic() + PATIENCE
@@ -68,10 +60,27 @@ def wait_for(viewer, condition):
         viewer.tick(0.0)
 
 
-def test_a_browser_is_told_the_scene(browser):
-    told = b""
-    while not all(name in told for name in (b"/policy_1", b"joint_6", b"panda-circle**, seed 0", b"Play")):
-        told += browser.connection.recv(timeout=PATIENCE)
+def test_a_browser_is_told_the_scene_and_its_controls_do_what_they_say(server, viewer):
+    session, target = viewer.session, viewer.scene.target
+    with connect(f"ws://{HOST}:{server.get_port()}", max_size=None, max_queue=None) as connection:
+        browser, told = Browser(connection), b""
+        wait_for(viewer, server.get_clients)
+        while not all(name in told for name in (b"/policy_1", b"joint_6", b"panda-circle**, seed 0", b"Play")):
+            told += connection.recv(timeout=PATIENCE)
+        browser.set(viewer.play, True)
+        wait_for(viewer, lambda: session.playing)
+        browser.set(viewer.time, 0.012)
+        wait_for(viewer, lambda: session.step == 12)
+        assert not session.playing
+        browser.set(viewer.joints[3], -1.0)
+        wait_for(viewer, lambda: session.mode is Mode.HAND)
+        assert session.shown()[0].q[3] == -1.0
+        session.scrub(0.0)
+        viewer.tick(0.0)
+        browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
+        wait_for(viewer, lambda: session.mode is Mode.FOLLOW)
+    viewer.tick(0.01)
+    assert session.reference[11] > session.stage.frames[0, 11]
 
 
 def test_what_is_played_is_shown(viewer):
@@ -84,18 +93,6 @@ def test_what_is_played_is_shown(viewer):
     np.testing.assert_allclose(frame.wxyz, [np.cos(q[2] / 2), *(np.sin(q[2] / 2) * session.stage.scenario.arm.axes[2])])
 
 
-def test_buttons_and_sliders_do_what_they_say(viewer, browser):
-    session = viewer.session
-    browser.set(viewer.play, True)
-    wait_for(viewer, lambda: session.playing)
-    browser.set(viewer.time, 0.012)
-    wait_for(viewer, lambda: session.step == 12)
-    assert not session.playing
-    browser.set(viewer.joints[3], -1.0)
-    wait_for(viewer, lambda: session.mode is Mode.HAND)
-    assert session.shown()[0].q[3] == -1.0
-
-
 def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     viewer.session.scrub(0.01)
     viewer.tick(1.0)  # readings and sliders are due
@@ -103,14 +100,6 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     assert viewer.session.mode is Mode.PLAY
     assert viewer.joints[0].value == pytest.approx(viewer.session.shown()[0].q[0], abs=1e-4)
     assert "dls" in viewer.readings.content
-
-
-def test_a_target_that_is_dragged_is_followed(viewer, browser):
-    session, target = viewer.session, viewer.scene.target
-    browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
-    wait_for(viewer, lambda: session.mode is Mode.FOLLOW)
-    viewer.tick(0.01)
-    assert session.reference[11] > session.stage.frames[0, 11]
 
 
 def test_a_picture_leaves_the_target_in_the_hand_that_drags_it(viewer):
@@ -167,10 +156,9 @@ def test_mistakes(options, message, capsys):
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("package", ["viser", "trimesh"])
-def test_without_it_the_extra_is_named(package, capsys, monkeypatch):
+def test_without_it_the_extra_is_named(capsys, monkeypatch):
     for name in [name for name in sys.modules if name.startswith("baselines.viewer.")]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["view", "--steps", "2", "--port", "0"]) == 2
-    assert f'This needs {package}: pip install "ikgym[view]"' in capsys.readouterr().err
+    assert 'This needs viser: pip install "ikgym[view]"' in capsys.readouterr().err

@@ -1,22 +1,9 @@
 """Solvers on three paths; two of them, so that it takes little time."""
 
-import math
-
-import pytest
-
 import ikgym
 from baselines.evaluation import report
 from baselines.evaluation.compare import playing
 from baselines.evaluation.compare.playing import compare
-from ikgym.exceptions import InvalidInputError
-from ikgym.plant import Plant
-
-
-def test_late_drives_have_a_time_constant_and_keep_the_rest_of_the_plant():
-    plant = playing.late(Plant(q_noise=1e-4))
-    share = 1.0 - math.exp(-2.0 * math.pi * plant.bandwidth * playing.LAG)  # of the gap, closed in one time constant
-    assert share == pytest.approx(1.0 - math.exp(-1.0))
-    assert (plant.command_delay, plant.q_noise) == (playing.DELAY, 1e-4)
 
 
 def test_a_path_out_of_reach_has_no_solver(monkeypatch):
@@ -45,8 +32,3 @@ def test_what_is_left_out_is_named(monkeypatch):
     assert retimed == "not retimed: No module named 'toppra'"
     assert rival.startswith("left out: pink: ")
     assert {row.policy for row in found.rows} == {"qp", "predicted"}
-
-
-def test_random_paths_are_refused():
-    with pytest.raises(InvalidInputError, match="the same at every reset"):
-        compare(ikgym.scenarios.get("varga7-random"))

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from baselines.evaluation.compare.rule import PREFERRED, fault, recommend
+from baselines.evaluation.compare.rule import recommend
 from tests.baselines.evaluation.test_report import BASE
 
 DT = 0.004
@@ -27,6 +27,10 @@ def test_qp_is_taken_where_nothing_stands_in_the_way():
     chosen = recommend(rows(), rows(), rows(), DT)
     assert (chosen.solver, chosen.retimed, chosen.late) == ("qp", False, True)
     assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too."
+    edge = {"qddot_peak": 3.0, "time_p50_us": 2000.0}  # of what is allowed
+    assert recommend(rows(qp=edge), {}, rows(), DT).solver == "qp"
+    # The calmest is one of those that follow.
+    assert recommend(rows(sns={**STOPPED, "qddot_peak": 0.1}), {}, rows(), DT).solver == "qp"
 
 
 @pytest.mark.parametrize(
@@ -34,6 +38,7 @@ def test_qp_is_taken_where_nothing_stands_in_the_way():
     [
         (MISSES, "qp errs by 12.3 mm."),
         (STOPPED, "qp has a joint at a stop."),
+        (MISSES | {"orientation_error_max": 2e-3}, "qp errs by 12.3 mm, 2 mrad."),
         (SLOW, "qp takes 2001 µs a call of a period of 4000 µs."),
         (HARSH, "qp needs 3.100 times the acceleration of the calmest."),
     ],
@@ -42,15 +47,6 @@ def test_the_next_one_is_taken_where_qp_has_a_fault(change, reason):
     chosen = recommend(rows(qp=change), {}, rows(), DT)
     assert chosen.solver == "sns"
     assert reason in chosen.reason
-
-
-def test_limits_of_the_rule_belong_to_what_is_allowed():
-    edge = {"qddot_peak": 3.0, "time_p50_us": 2000.0}
-    assert recommend(rows(qp=edge), {}, rows(), DT).solver == "qp"
-
-
-def test_the_calmest_is_one_of_those_that_follow():
-    assert recommend(rows(sns={**STOPPED, "qddot_peak": 0.1}), {}, rows(), DT).solver == "qp"
 
 
 def test_who_follows_with_late_drives_takes_precedence():
@@ -73,15 +69,6 @@ def test_a_path_is_retimed_only_where_no_solver_follows_it():
     assert (chosen.solver, chosen.retimed) == ("qp", True)
     assert str(chosen).startswith("Recommended: qp on the retimed path, which ikgym path --retime writes. No solver")
     assert "No solver follows the path as it is: qp errs by 12.3 mm. qp follows" in chosen.reason
-
-
-def test_no_solver_is_an_answer():
     chosen = recommend(ALL_MISS, rows(qp=STOPPED, sns=MISSES, dls=SLOW), rows(), DT)
     assert (chosen.solver, chosen.retimed) == (None, False)
     assert str(chosen) == "Recommended: none of these solvers. No solver follows the path: qp errs by 12.3 mm."
-
-
-def test_faults_state_both_errors():
-    turned = dataclasses.replace(GOOD, followed=False, orientation_error_max=2e-3)
-    assert fault(turned, DT) == "errs by 0.001 mm, 2 mrad"
-    assert PREFERRED[0] == "qp"

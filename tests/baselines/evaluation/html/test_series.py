@@ -7,16 +7,7 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.evaluation.export import FRAMES, frame_rows, trajectory_log
-from baselines.evaluation.html.series import (
-    ACCELERATION,
-    BUDGET,
-    FEWEST,
-    FREE,
-    STOP,
-    VELOCITY,
-    limits,
-    thinned,
-)
+from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thinned
 from baselines.recording import Seeds
 from tests.limited import limited
 
@@ -36,14 +27,13 @@ def log():
     return log_of(limited(steps=1000, dt=0.001))
 
 
-@pytest.mark.parametrize("rows", [1, 2, 399, 400, 401, 1000, 6283])
-def test_frames_are_spread_evenly_and_end_with_the_last_row(rows):
-    frames = frame_rows(rows, FRAMES)
-    assert len(frames) == min(rows, FRAMES)
-    assert frames[-1] == rows - 1
-    gaps = np.diff(frames, prepend=-1)
-    assert gaps.min() >= 1
-    assert gaps.max() - gaps.min() <= 1
+def test_frames_are_spread_evenly_and_end_with_the_last_row():
+    for rows in (1, 2, 399, 400, 401, 6283):
+        frames = frame_rows(rows, FRAMES)
+        assert len(frames) == min(rows, FRAMES)
+        assert frames[-1] == rows - 1
+        gaps = np.diff(frames, prepend=-1)
+        assert 1 <= gaps.min() <= gaps.max() <= gaps.min() + 1
 
 
 @pytest.mark.parametrize("name", ["panda-field", "panda-payload", "varga7-pose-random"])
@@ -76,7 +66,10 @@ def test_no_peak_is_lost_however_few_rows_are_kept(log, size):
     log["position_error"][333] = 7.0
     log["qdot"][334, 2], log["qdot"][335, 2] = -9.0, 8.0
     log["orientation_error"][100] = np.nan
-    arrays = {name: decoded(values) for name, values in thinned(log, size)["arrays"].items()}
+    series = thinned(log, size)
+    if size == 30_000:
+        assert 0.6 * size < sum(len(array["data"]) for array in series["arrays"].values()) <= size
+    arrays = {name: decoded(values) for name, values in series["arrays"].items()}
     rows = len(arrays["time"])
     assert rows == {BUDGET: FRAMES, 1: FEWEST}.get(size, rows)
     assert arrays["position_error"].max() == 7.0
@@ -86,13 +79,6 @@ def test_no_peak_is_lost_however_few_rows_are_kept(log, size):
     before = arrays["time"][place - 1]
     assert before < np.float32(log["time"][333]) <= arrays["time"][place]
     assert arrays["time"][-1] == np.float32(log["time"][-1])
-
-
-def test_a_series_keeps_to_its_size(log):
-    for size in (20_000, 60_000, 120_000):
-        series = thinned(log, size)
-        text = sum(len(array["data"]) for array in series["arrays"].values())
-        assert 0.6 * size < text <= size
 
 
 def test_limits_tell_the_most_severe():
@@ -106,10 +92,3 @@ def test_limits_tell_the_most_severe():
     assert limits(log).tolist() == [[FREE, STOP, STOP, VELOCITY, ACCELERATION]]
     without = {"lower": np.full(5, -np.inf), "upper": np.full(5, np.inf), "velocity_limit": np.full(5, np.inf)}
     assert limits({**log, **without, "acceleration_limit": np.full(5, np.inf)}).tolist() == [[FREE] * 5]
-
-
-def test_logs_without_pictures_have_curves(log):
-    before = {name: values for name, values in log.items() if name not in ("frame", "joint_points", "tool_rotation")}
-    series = thinned(before, BUDGET)
-    assert "points" not in series["arrays"]
-    assert series["arrays"]["q"] == thinned(log, BUDGET)["arrays"]["q"]
