@@ -18,7 +18,6 @@ from ikgym.obstacles import Sphere
 from ikgym.trajectories import StraightLine
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
-from tests.spawning import random_env
 
 #: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held and with a late plant.
 ONE_A_TASK = (
@@ -207,19 +206,6 @@ def test_global_random_state_is_left_alone():
     env.reset(seed=1)
     env.step(np.zeros(7, dtype=np.float32))
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
-
-
-@pytest.mark.slow  # the environments by id have one that always runs
-def test_spawned_workers():
-    envs = gym.vector.AsyncVectorEnv([random_env] * 2, context="spawn")
-    try:
-        observation, _ = envs.reset(seed=3)
-        here = make("varga7-random", preview=1)
-        assert identical(observation["nominal"][1], here.reset(seed=4)[0]["nominal"])
-        *_, infos = envs.step(np.zeros((2, 7), dtype=np.float32))
-        assert infos["_time"].all()
-    finally:
-        envs.close()
 
 
 def test_ids_and_arguments():

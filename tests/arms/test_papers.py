@@ -25,15 +25,6 @@ def test_varga_read_literally_depends_on_the_sum_of_q4_and_q5_alone():
             np.testing.assert_allclose(here, there, rtol=0, atol=1e-14)
 
 
-def test_varga_with_segments_after_joints_is_redundant():
-    arm = arms.get("varga7")
-    for q in CONFIGURATIONS[:, :7]:
-        jacobian = arm.jacobian(q)
-        assert np.linalg.matrix_rank(jacobian) == 6
-        # The joints that would be coaxial in the literal reading do different things here.
-        assert np.linalg.norm(jacobian[:, 3] - jacobian[:, 4]) > 0.1
-
-
 def test_varga_segments_after_joints_as_a_product_of_homogeneous_matrices():
     segments = np.array([[0, 0, 1], [0, 0, 0], [2, 0, 0], [1, 0, 1], [1.5, 0, 0], [0, 0, 0], [0, 0, 0]])
     for q in CONFIGURATIONS[:, :7]:

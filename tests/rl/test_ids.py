@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.env_util import make_vec_env
 
@@ -202,18 +202,6 @@ def test_wrappers_of_gymnasium(name):
 
 
 @one_id_at_least
-def test_an_episode_is_recorded(name, tmp_path):
-    pytest.importorskip("moviepy")
-    env = TimeLimit(gym.make(name, render_mode="rgb_array"), 4)
-    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
-    env.reset(seed=0)
-    for action in actions_of(env, 4):
-        env.step(action)
-    env.close()
-    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
-
-
-@every_id
 def test_torchrl_takes_it(name):
     check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
     from torchrl.envs import GymEnv, GymWrapper

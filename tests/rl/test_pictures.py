@@ -11,7 +11,7 @@ from ikgym import rl
 from ikgym.exceptions import ResetNeededError
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 
-STEPS = 3
+STEPS = 2
 SHORT = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
 
 
@@ -28,7 +28,7 @@ def test_pictures_of_many_are_those_of_single_ones(mode):
     for envs in (ours, theirs):
         envs.reset(seed=3)
     ended = 0
-    for _ in range(7):
+    for _ in range(4):
         for mine, other in zip(ours.render(), theirs.render(), strict=True):
             np.testing.assert_array_equal(mine, other)
         for envs in (ours, theirs):
@@ -36,7 +36,7 @@ def test_pictures_of_many_are_those_of_single_ones(mode):
             if mode is AutoresetMode.DISABLED and truncated.any():
                 envs.reset(options={"reset_mask": truncated})
             ended += truncated.any()
-    assert ended == 2 * 2  # two of each
+    assert ended >= 2  # of both
 
 
 def test_episodes_of_many_arms_are_recorded_side_by_side(tmp_path):

@@ -57,7 +57,7 @@ def test_at_the_bounds_all_is_finite():
         assert env.observation_space.contains(observation)
 
 
-@pytest.mark.parametrize("steps", [10**12, 10**9, 10**400])
+@pytest.mark.parametrize("steps", [10**9, 10**400])
 @pytest.mark.parametrize("field", ["steps", "iterations_per_point"])
 def test_more_steps_than_any_memory_holds(field, steps):
     message = (
@@ -87,7 +87,7 @@ def test_many_steps_need_memory():
     lambda n: ikgym.RedundantIKVectorEnv(n),
     lambda n: __import__("ikgym.sb3").sb3.RedundantIKVecEnv(n, "varga7-random"),
 ])  # fmt: skip
-@pytest.mark.parametrize("number", [10**6, 10**13, 10**400])
+@pytest.mark.parametrize("number", [10**6, 10**400])
 @pytest.mark.usefixtures("little")
 def test_many_environments_need_memory(make, number):
     with pytest.raises(

@@ -44,12 +44,6 @@ def folder(tmp_path, monkeypatch):
         sys.modules.pop(name, None)
 
 
-@pytest.fixture
-def registry(monkeypatch):
-    monkeypatch.setattr(scenarios._registry, "_makers", dict(scenarios._registry._makers))
-    monkeypatch.setattr(scenarios._registry, "_made", dict(scenarios._registry._made))
-
-
 ITEMS = [
     "short.toml",
     pathlib.Path("short.toml"),
@@ -68,7 +62,7 @@ def test_find(folder, item):
     assert sys.path == before
 
 
-def test_registered_names_take_precedence(folder, registry):
+def test_registered_names_take_precedence(folder, own_registries):
     scenarios.register("short.toml", lambda: FAST)
     scenarios.register("my_scenarios:SHORT", lambda: FAST)
     assert scenarios.find("short.toml") is scenarios.find("my_scenarios:SHORT") is FAST
