@@ -174,9 +174,7 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
 
 #: Arms, joint coordinates and errors that are drawn at the worst: each value once, not all together, since the picture
 #: of the arm and the curves of its errors do not know each other.
-WORST = [
-    *(("varga7", q, error) for q, error in ((0.0, 0.0), (0.0, 1e300), (-1e9, np.inf), (1e6, 1e-300))),
-]
+WORST = [*(("varga7", q, error) for q, error in ((0.0, 0.0), (0.0, 1e300), (-1e9, np.inf), (1e6, 1e-300)))]
 
 
 @pytest.mark.parametrize(("name", "q", "error"), WORST)

@@ -107,13 +107,7 @@ def test_what_is_returned_is_the_callers():
 
 @pytest.mark.parametrize(
     "options",
-    [
-        {"p": 1},
-        {"reset_mask": np.ones(N, dtype=bool)},
-        {"q": np.zeros(6)},
-        [{"q": np.zeros(7)}, {}, {}],
-        [{}, {}],
-    ],
+    [{"p": 1}, {"reset_mask": np.ones(N, dtype=bool)}, {"q": np.zeros(6)}, [{"q": np.zeros(7)}, {}, {}], [{}, {}]],
 )
 def test_bad_options_change_nothing(options):
     ours, untouched = RedundantIKVecEnv(N, noisy()), RedundantIKVecEnv(N, noisy())

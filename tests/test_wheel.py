@@ -32,12 +32,7 @@ def test_it_holds_every_module_and_all_data(content):
         files = {path.relative_to(ROOT).as_posix() for path in (ROOT / package).rglob("*") if path.is_file()}
         assert {file for file in files if file.endswith((".py", *DATA))} <= content
     assert {file for file in content if not file.endswith(".py")} <= {file for file in content if file.endswith(DATA)}
-    for file in (
-        "best_known.json",
-        "ranges.toml",
-        "agents/agent_alone.safetensors",
-        "agents/agent_track.safetensors",
-    ):
+    for file in ("best_known.json", "ranges.toml", "agents/agent_alone.safetensors", "agents/agent_track.safetensors"):
         assert f"baselines/data/{file}" in content
     assert "baselines/training/presets.toml" in content
     # The problems of others, and the notices that their licences ask for.

@@ -34,9 +34,6 @@ def rows(
 
     Returns:
         Shape (k, o, 16).
-
-    Raises:
-        InvalidInputError: There is no room for an obstacle in an episode.
     """
     out, at = np.tile(first, (len(episodes), 1, 1)), 0
     if not any(one.random for one in obstacles):
@@ -52,12 +49,7 @@ def rows(
 
 
 def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
-    """Obstacles of one episode, none of them random.
-
-    Args:
-        obstacles: The obstacles of the scenario.
-        numbers: Their rows in the episode. Shape (o, 16).
-    """
+    """Obstacles of one episode, none of them random, from their rows of shape (o, 16)."""
     out: list[Obstacle] = []
     at = 0
     for one in obstacles:
@@ -67,13 +59,7 @@ def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle,
 
 
 def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The smallest and the largest numbers of obstacles in any episode.
-
-    Args:
-        obstacles: The obstacles.
-        low: The smallest numbers of those that are not drawn; others do not matter. Shape (o, 16).
-        high: The largest ones. Shape (o, 16).
-    """
+    """The smallest and the largest numbers of obstacles in any episode, from those of obstacles that are not drawn."""
     low, high, at = low.copy(), high.copy(), 0
     for one in obstacles:
         if isinstance(one, RandomBoxes):

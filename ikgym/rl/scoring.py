@@ -100,21 +100,13 @@ def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str
 
 
 def environment(name: str) -> type[TaskEnv]:
-    """The class of an id.
-
-    Raises:
-        UnknownNameError: There is no such environment.
-    """
+    """The class of an id."""
     known_name("environment", name, IDS)
     return IDS[name]
 
 
 def yardsticks(split: str) -> dict[str, dict[str, float]]:
-    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`.
-
-    Raises:
-        UnknownNameError: They are not known for that split.
-    """
+    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`."""
     known_name("split", split, [one for one in _yardsticks() if one in scenarios.SPLITS])
     found: dict[str, dict[str, float]] = _yardsticks()[split]
     return found

@@ -18,10 +18,6 @@ def imported(import_path: str) -> Scenario:
     Args:
         import_path: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make
             one. Modules in the current folder are found, too.
-
-    Raises:
-        InvalidInputError: The path has another form, the module cannot be imported, or it leads to no scenario.
-        UnknownNameError: The module has no such attribute; the message has the nearest one.
     """
     name, _, attribute = import_path.partition(":")
     if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):

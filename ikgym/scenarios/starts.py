@@ -25,9 +25,6 @@ def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
 
     Returns:
         Joint coordinates in [rad] or [m], read-only. Shape (n,).
-
-    Raises:
-        InvalidInputError: None were found; the message says how far the nearest are from the pose.
     """
     rotation, position = (frame[:9].reshape(3, 3) if len(frame) == 12 else None), frame[-3:]
     q, converged = arm.inverse(rotation, position)

@@ -24,11 +24,7 @@ class Orientation(Frozen, abc.ABC):
     """The orientation of a tool as a function of the arc length of its path."""
 
     def check(self, path: Path) -> None:
-        """Checks that the law suits a path.
-
-        Raises:
-            InvalidInputError: It does not.
-        """
+        """Checks that the law suits a path."""
         del path
 
     @abc.abstractmethod
@@ -170,11 +166,7 @@ class OrientationThrough(Orientation):
 
 
 def aligned_quaternions(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4).
-
-    Raises:
-        InvalidInputError: See :class:`OrientationThrough`.
-    """
+    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4)."""
     given = float_array(name, value, (None, 4), at_most=LARGEST)
     lengths = np.linalg.norm(given, axis=1)
     if (np.abs(lengths - 1.0) > QUATERNION_TOLERANCE).any():

@@ -44,10 +44,7 @@ def test_no_step_costs_more_than_the_bound(name):
 
 def test_at_the_bounds_all_is_finite():
     scenario = FAST.replace(
-        cost=ikgym.TrackingCost(delta_x=1e-12),
-        dt=1e12,
-        velocity_limit=1e12,
-        trajectory=Sinusoid([1e12] * 7, 1e12),
+        cost=ikgym.TrackingCost(delta_x=1e-12), dt=1e12, velocity_limit=1e12, trajectory=Sinusoid([1e12] * 7, 1e12)
     )
     env = ikgym.RedundantIKEnv(scenario.replace(steps=3))
     env.reset(seed=0)

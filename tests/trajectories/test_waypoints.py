@@ -84,10 +84,7 @@ def test_a_file_gives_what_its_arrays_give(tmp_path):
         (HEAD + "1,2,3,1,0,0,0,0\n", "points.csv: times: expected from 2 to 200000 waypoints, got 1"),
         (HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,0,0,0,0\n", "rise, got 0 s and 0 s as numbers 0 and 1"),
         (HEAD + "1,2,3,1,0,0,0,-1\n4,5,6,1,0,0,0,0\n", "expected times from 0 on, got -1 s as the first"),
-        (
-            HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,1,0,0,1\n",
-            "expected unit quaternions, .* of length 1.41421 as number",
-        ),
+        (HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,1,0,0,1\n", "expected unit quaternions, .* of length 1.41421 as number"),
     ],
 )
 def test_bad_files(text, message, tmp_path):

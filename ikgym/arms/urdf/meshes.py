@@ -29,10 +29,6 @@ def corners(where: str, name: str, folder: Path) -> tuple[FloatArray, float]:
 
     Returns:
         Points in the unit of the mesh, of shape (p, 3), and the volume in that unit.
-
-    Raises:
-        InvalidInputError: There is no such file, or it is no mesh.
-        MissingDependencyError: trimesh is not installed.
     """
     try:
         import trimesh
