@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -113,6 +113,11 @@ def signed(name: str, value: float) -> float:
     return number(name, value, at_least=-LARGEST, at_most=LARGEST)
 
 
+def positive(name: str, value: float) -> float:
+    """A number from :data:`SMALLEST` to :data:`LARGEST`."""
+    return number(name, value, at_least=SMALLEST, at_most=LARGEST)
+
+
 def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = None) -> int:
     """A whole number within its bounds."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
@@ -208,6 +213,10 @@ class Frozen:
         """Sets checked fields while the object is made."""
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _settle_by(self, check: Callable[..., Any], *names: str, **bounds: Any) -> None:
+        """Sets fields to what a check of this module, such as :func:`number`, makes of them."""
+        self._settle(**{name: check(name, getattr(self, name), **bounds) for name in names})
 
     def _fields(self) -> Mapping[str, Any]:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}  # type: ignore[arg-type]

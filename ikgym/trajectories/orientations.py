@@ -54,7 +54,7 @@ class FixedOrientation(Orientation):
     rotation: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
+        self._settle_by(rotation_matrix, "rotation")
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`."""
@@ -81,7 +81,7 @@ class AlongPath(Orientation):
         if not approach.any():
             raise InvalidInputError("approach: expected a direction, got the zero vector.")
         self._settle(approach=approach)
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
+        self._settle_by(rotation_matrix, "rotation")
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path may nowhere lead in the direction of the approach."""
@@ -123,8 +123,8 @@ class Turning(Orientation):
     vector: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
-        self._settle(vector=frozen_array("vector", self.vector, (3,), at_most=LARGEST))
+        self._settle_by(rotation_matrix, "rotation")
+        self._settle_by(frozen_array, "vector", shape=(3,), at_most=LARGEST)
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`, with Rodrigues' formula."""
@@ -151,7 +151,7 @@ class OrientationThrough(Orientation):
     quaternions: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(quaternions=aligned_quaternions("quaternions", self.quaternions))
+        self._settle_by(aligned_quaternions, "quaternions")
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path has as many waypoints."""

@@ -69,11 +69,8 @@ class Outline(Path):
 
 def settle_placement(path: Path) -> None:
     """Checks the center and the rotation that place a plane figure."""
-    for name, value in {
-        "center": frozen_array("center", getattr(path, "center"), (3,), at_most=LARGEST),  # noqa: B009
-        "rotation": rotation_matrix("rotation", getattr(path, "rotation")),  # noqa: B009
-    }.items():
-        object.__setattr__(path, name, value)
+    path._settle_by(frozen_array, "center", shape=(3,), at_most=LARGEST)
+    path._settle_by(rotation_matrix, "rotation")
 
 
 def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
