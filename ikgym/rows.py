@@ -40,12 +40,7 @@ class Hinting(type):
 
 
 class ArmRow:
-    """Attributes of one of N arms: the shared ones, its generator, and those set by users.
-
-    Args:
-        envs: The vector environment.
-        index: Number of the row.
-    """
+    """Attributes of one of N arms: the shared ones, its generator, and those set by users."""
 
     def __init__(self, envs: Any, index: int) -> None:
         self.__dict__.update(_envs=envs, _index=index)

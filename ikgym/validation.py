@@ -28,17 +28,7 @@ SMALLEST, LARGEST = 1e-12, 1e12
 def float_array(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
 ) -> FloatArray:
-    """A fresh, C-contiguous float64 copy of finite numbers.
-
-    Args:
-        name: Name of the value in messages.
-        value: Anything that NumPy can cast to float64 without losing its meaning.
-        shape: Required shape, None for any length; any shape by default.
-        at_most: Largest absolute value.
-
-    Returns:
-        The copy. Shape as given.
-    """
+    """A fresh, C-contiguous float64 copy of finite numbers, of a shape in which None stands for any length."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiub":
@@ -165,12 +155,7 @@ def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 
 
 def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does, as a fresh array.
-
-    Args:
-        name: Name of the value in messages.
-        value: The matrices. Shape (..., 3, 3).
-    """
+    """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does. Fresh, of shape (..., 3, 3)."""
     matrices = float_array(name, value, at_most=LARGEST)
     if matrices.shape[-2:] != (3, 3):
         raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")

@@ -22,18 +22,9 @@ def rows(
     times: FloatArray,
     generators: Sequence[np.random.Generator],
 ) -> FloatArray:
-    """The obstacles at the start of several episodes.
+    """The obstacles at the start of k episodes, from their rows before any is drawn. Shapes (k, o, 16), (o, 16).
 
-    Args:
-        arm: The arm of the data sheet.
-        obstacles: The obstacles.
-        first: Their rows before any is drawn. Shape (o, 16).
-        episodes: Trajectories of the k episodes.
-        times: Times of the steps in [s]. Shape (t,).
-        generators: One an episode; touched only where an obstacle is drawn.
-
-    Returns:
-        Shape (k, o, 16).
+    Generators, one an episode, are touched only where an obstacle is drawn; times are those of the steps in [s].
     """
     out, at = np.tile(first, (len(episodes), 1, 1)), 0
     if not any(one.random for one in obstacles):

@@ -17,12 +17,7 @@ SMALLEST, LARGEST = 1e-9, 1e99  # errors are clipped to this range, in [m] or [r
 class ErrorCurve:
     """An error over time, on a logarithmic axis that grows by whole decades and never shrinks.
 
-    Args:
-        axes: The axes.
-        name: Of the error.
-        unit: Of the error.
-        color: Of the curve.
-        last: Whether these are the lowest axes, which show the times.
+    The lowest axes of several, the last, show the times.
     """
 
     def __init__(self, axes: Any, name: str, unit: str, color: str, *, last: bool) -> None:

@@ -46,15 +46,7 @@ FRAME = 0.14
 
 
 class Scene:
-    """The picture and its moving parts.
-
-    Args:
-        figure: The figure.
-        arm: The arm that moves.
-        title: Title of the picture.
-        has_orientation: Whether there is an orientation error to show.
-        surroundings: The obstacles as they are at the start; None if neither they nor bodies are shown.
-    """
+    """The picture and its moving parts, see :class:`ikgym.rendering.Renderer`."""
 
     def __init__(
         self, figure: Figure, arm: Arm, title: str, has_orientation: bool, surroundings: Surroundings | None = None

@@ -15,13 +15,7 @@ from ikgym.validation import FloatArray
 
 
 class SolidLines:
-    """The lines of bodies, obstacles and the closest pair.
-
-    Args:
-        arm: The arm that moves.
-        surroundings: The obstacles as they are at the start.
-        line: Makes a line in space, from its name and its style.
-    """
+    """The lines of bodies, obstacles and the closest pair; `line` makes one in space, from its name and its style."""
 
     def __init__(self, arm: Arm, surroundings: Surroundings, line: Callable[..., Any]) -> None:
         self._arm, self._surroundings = arm, surroundings

@@ -65,13 +65,7 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
 
 
 def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
-    """The infos of each step of whole episodes, also beyond where training would end them.
-
-    Args:
-        model: Any object with the `predict` of Stable-Baselines3.
-        task: What it sees.
-        seeds: Of the episodes.
-    """
+    """The infos of each step of whole episodes, also beyond where training would end them; see :func:`costs`."""
     envs = task.replace(lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
     observation, _ = envs.reset(seed=list(seeds))
     state, begun = None, np.ones(len(seeds), dtype=np.bool_)

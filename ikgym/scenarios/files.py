@@ -172,12 +172,7 @@ def located(where: str, file: object = None) -> Iterator[None]:
 
 
 def save(fields: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
-    """Writes a scenario to a file, in one go.
-
-    Args:
-        fields: The fields of the scenario.
-        file: A name that ends in ``.toml``.
-    """
+    """Writes the fields of a scenario to a file, in one go."""
     try:
         path = pathlib.Path(file)
     except TypeError:

@@ -9,12 +9,7 @@ from ikgym.scenarios.scenario import Scenario
 
 
 def imported(import_path: str) -> Scenario:
-    """The scenario with an import path.
-
-    Args:
-        import_path: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make
-            one.
-    """
+    """The scenario with an import path, whose attribute is one, or is called without arguments to make one."""
     name, _, attribute = import_path.partition(":")
     if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):
         raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {import_path!r}.")
