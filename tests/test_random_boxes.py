@@ -65,22 +65,6 @@ def test_an_episode_with_its_boxes_fixed_is_the_same(tmp_path):
     assert identical(again.obstacles_of(2)[9].position, SCENARIO.obstacles_of(2)[9].position)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"count": 0}, "count of obstacle 'box'"),
-        ({"count": 10**6}, "count of obstacle 'box'"),
-        ({"smallest": [0.0, 0.1, 0.1]}, "smallest of obstacle 'box': expected numbers above 0"),
-        ({"lower": [0.0, 0.0, 2.0]}, "expected lower <= upper"),
-        ({"within": 0.01}, "within of obstacle 'box'"),
-        ({"margin": float("nan")}, "margin of obstacle 'box'"),
-    ],
-)
-def test_bad_input(changes, message):
-    with pytest.raises(InvalidInputError, match=message):
-        BOXES.replace(**changes)
-
-
 def test_no_room_and_no_motion():
     crowded = RandomBoxes("box", [-0.1] * 3, [0.1] * 3, [0.5] * 3, [0.5] * 3)
     with pytest.raises(InvalidInputError, match="expected room for 10 boxes"):
