@@ -83,7 +83,7 @@ def test_arms_and_paths_give_a_picture_of_the_same_even_size(name):
 def test_a_picture_changes_with_the_arm_and_only_with_it():
     env = environment()
     pictures = [env.render()]
-    for _ in range(3):
+    for _ in range(2):
         move(env)
         pictures.append(env.render())
     np.testing.assert_array_equal(env.render(), pictures[-1])
@@ -95,7 +95,7 @@ def test_a_picture_changes_with_the_arm_and_only_with_it():
 
 def test_a_second_episode_looks_as_if_it_were_the_first():
     env, fresh = environment("varga7-random"), environment("varga7-random")
-    for _ in range(4):
+    for _ in range(2):
         move(env, 1.0)
         env.render()
     for one in (env, fresh):
