@@ -28,7 +28,7 @@ SMALLEST, LARGEST = 1e-12, 1e12
 def float_array(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
 ) -> FloatArray:
-    """A fresh, C-contiguous float64 copy of finite numbers, of a shape in which None stands for any length."""
+    """A fresh, C-contiguous float64 copy of finite numbers; in a shape None is any length, `at_most` is absolute."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiub":
