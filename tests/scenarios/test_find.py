@@ -8,6 +8,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.cli import main
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError
 from ikgym.sb3 import RedundantIKVecEnv
@@ -57,6 +58,12 @@ ITEMS = [
 def test_find(folder, item):
     found = scenarios.find(item)
     assert (found.name, found.steps, found.arm.name) == ("short", 3, "varga7")
+
+
+def test_the_command_line_searches_the_current_folder(folder, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(folder))])
+    assert main(["evaluate", "--scenarios", "my_scenarios:SHORT", "--policies", "dls"]) == 0
+    assert "short" in capsys.readouterr().out
 
 
 def test_registered_names_take_precedence(folder, own_registries):
