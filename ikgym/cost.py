@@ -12,7 +12,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
 from ikgym.kernels.cost import CostParameters
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, float_array, number
+from ikgym.validation import FloatArray, Frozen, float_array, number, positive
 
 #: The exponents of the cost do not exceed it.
 LARGEST_EXPONENT = 100.0
@@ -48,10 +48,8 @@ class TrackingCost(Frozen):
     p_in: float = 4.0
 
     def __post_init__(self) -> None:
-        for name in ("delta_x", "delta_qdot"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
-        for name in ("p_x", "p_out", "p_in"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT)})
+        self._settle_by(positive, "delta_x", "delta_qdot")
+        self._settle_by(number, "p_x", "p_out", "p_in", at_least=1.0, at_most=LARGEST_EXPONENT)
 
     @property
     def parameters(self) -> CostParameters:
@@ -155,10 +153,8 @@ class ProximityCost(Frozen):
     p_in: float = 2.0
 
     def __post_init__(self) -> None:
-        for name in ("clearance", "delta"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
-        for name in ("p_out", "p_in"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=1.0, at_most=LARGEST_EXPONENT)})
+        self._settle_by(positive, "clearance", "delta")
+        self._settle_by(number, "p_out", "p_in", at_least=1.0, at_most=LARGEST_EXPONENT)
 
     @property
     def parameters(self) -> ProximityParameters:

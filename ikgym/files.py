@@ -18,15 +18,7 @@ _LONG_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*
 
 
 def write(file: pathlib.Path, content: bytes) -> None:
-    """Writes a file atomically: readers see the old content or the new one, also after a crash.
-
-    Args:
-        file: The file; missing folders are made.
-        content: All of its bytes.
-
-    Raises:
-        OSError: It cannot be written.
-    """
+    """Writes a file atomically, with its folders: readers see the old content or the new one, also after a crash."""
     # In the same folder, since renaming is atomic only within one file system.
     draft = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -42,15 +34,7 @@ def write(file: pathlib.Path, content: bytes) -> None:
 
 
 def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
-    """The content of a file of a user.
-
-    Args:
-        file: The file.
-        most: Largest size in bytes.
-
-    Raises:
-        InvalidInputError: It does not exist, is not a regular file, is larger, or cannot be read.
-    """
+    """The content of a file of a user, with at most so many bytes; an error says why it cannot be read."""
     try:
         # A pipe would wait for its writer.
         with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
@@ -67,11 +51,7 @@ def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
 
 
 def read_user_toml(file: str | os.PathLike[str]) -> dict[str, Any]:
-    """The content of a TOML file of a user.
-
-    Raises:
-        InvalidInputError: It cannot be read, see :func:`read_user_file`, or is no TOML.
-    """
+    """The content of a TOML file of a user, see :func:`read_user_file`."""
     content = read_user_file(file, LARGEST_TOML)
     if _LONG_KEY.search(content):
         raise InvalidInputError(f"{file}: expected keys of at most 50 names, got one with more dots.")

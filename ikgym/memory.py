@@ -16,15 +16,7 @@ GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"
 
 
 def check_memory(name: str, needed: int) -> None:
-    """Checks that there is memory for something.
-
-    Args:
-        name: Its name, with which the message begins.
-        needed: About how much it takes, in bytes.
-
-    Raises:
-        InvalidInputError: Less is available; the message has both in GiB.
-    """
+    """Checks that there is memory for something of so many bytes, whose name begins the message."""
     if needed <= SMALL:
         return
     left = available()
@@ -35,23 +27,13 @@ def check_memory(name: str, needed: int) -> None:
 
 
 def of_rows(rows: int, shown: int, frames: int) -> int:
-    """About how much memory N arms take, in bytes.
-
-    Args:
-        rows: N.
-        shown: Numbers that a row shows after a step.
-        frames: Numbers in the nominal frames of all rows.
-    """
+    """About how much memory N arms take, in bytes, by the numbers that a row shows and those of all nominal frames."""
     # Observations have copies: state, actions, bounds of the spaces. A row's generator takes the rest.
     return rows * (5 * 8 * shown + 1500) + 8 * frames
 
 
 def gib(amount: int) -> str:
-    """An amount of memory in words.
-
-    Args:
-        amount: In bytes.
-    """
+    """A number of bytes in words."""
     return f"{amount // GIB:,} GiB" if amount >= 100 * GIB else f"{amount / GIB:.1f} GiB"
 
 

@@ -15,11 +15,7 @@ from ikgym.validation import BoolArray, FloatArray, known_names, number, one_a_r
 
 
 def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequence[int | None]:
-    """One seed a row: seed + i, or the i-th of a sequence, or None.
-
-    Raises:
-        InvalidInputError: They are no whole numbers, or not one a row.
-    """
+    """One seed a row: seed + i, or the i-th of a sequence, or None."""
     if isinstance(seed, (int, np.integer)):
         first = whole_number("seed", seed, at_least=0)
         return [first + row for row in range(rows)]
@@ -27,11 +23,7 @@ def checked_seeds(seed: int | Sequence[int | None] | None, rows: int) -> Sequenc
 
 
 def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:
-    """Rows to reset, by default all. Shape (N,).
-
-    Raises:
-        InvalidInputError: It is no Boolean array of that shape, or has no true entry.
-    """
+    """Rows to reset, by default all. Shape (N,)."""
     if mask is None:
         return np.ones(rows, dtype=np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (rows,):
@@ -44,11 +36,7 @@ def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:
 
 
 def checked_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    """A mode of Gymnasium, also by its value.
-
-    Raises:
-        UnknownNameError: There is none.
-    """
+    """A mode of Gymnasium, also by its value."""
     if isinstance(mode, AutoresetMode):
         return mode
     try:
@@ -58,21 +46,12 @@ def checked_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def checked_distance(distance: float | None) -> float | None:
-    """The distance at which a track is lost, or None.
-
-    Raises:
-        InvalidInputError: It is no number above 0.
-    """
+    """The distance at which a track is lost, or None."""
     return None if distance is None else number("lost_distance", distance, above=0.0)
 
 
 def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
-    """The options of a reset.
-
-    Raises:
-        UnknownNameError: There is no such option.
-        InvalidInputError: They are no dict.
-    """
+    """The options of a reset."""
     if options is None:
         return {}
     if not isinstance(options, dict):
@@ -82,17 +61,7 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
 
 
 def take_actions(actions: npt.ArrayLike, shape: tuple[int, ...], active: BoolArray, out: FloatArray) -> None:
-    """Checks actions, and takes them over.
-
-    Args:
-        actions: Joint velocities as fractions of the velocity limit.
-        shape: Their shape, (n,) or (N, n).
-        active: The rows that step. Shape (N,).
-        out: Receives them. Shape (N, n).
-
-    Raises:
-        InvalidInputError: They have a wrong shape or type, or one of an active row is not finite.
-    """
+    """Checks actions of a shape, (n,) or (N, n), and takes them over; those of active rows are finite."""
     try:
         raw = np.asarray(actions)
     except ValueError:  # lists of different lengths

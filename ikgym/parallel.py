@@ -21,23 +21,13 @@ def cores() -> int:
 
 
 def limit(number: int | None) -> None:
-    """Has this process use fewer cores than the system lets it: a cluster counts them, and binds nobody to them.
-
-    Args:
-        number: The most that it uses; None for all.
-    """
+    """Has this process use at most so many cores, None for all: a cluster counts them, and binds nobody to them."""
     global _limit
     _limit = number
 
 
 def in_chunks(work: Callable[[int, int], object], rows: int, grain: int) -> None:
-    """Runs ``work(start, stop)`` over all rows, in as many threads as there are cores.
-
-    Args:
-        work: Called with the first row of a chunk and the one after its last.
-        rows: The number of rows.
-        grain: Rows that are worth a thread; fewer are worked off in this one.
-    """
+    """Runs ``work(start, stop)`` over all rows, in as many threads as there are cores; `grain` rows are worth one."""
     # The cores are counted only where there is work for more than one: asking for them takes time, too.
     chunks = rows // max(grain, 1)
     chunks = min(chunks, cores()) if chunks > 1 else chunks

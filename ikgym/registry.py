@@ -11,12 +11,7 @@ Member = TypeVar("Member")
 
 
 class Registry(Generic[Member]):
-    """Names, and functions that make the members.
-
-    Args:
-        kind: Word for a member in messages, for example ``"arm"``.
-        member: The class that all members are of.
-    """
+    """Names, and functions that make the members: of what kind in messages, such as ``"arm"``, and of which class."""
 
     def __init__(self, kind: str, member: type[Member]) -> None:
         self.kind, self._member = kind, member

@@ -40,12 +40,7 @@ class Hinting(type):
 
 
 class ArmRow:
-    """Attributes of one of N arms: the shared ones, its generator, and those set by users.
-
-    Args:
-        envs: The vector environment.
-        index: Number of the row.
-    """
+    """Attributes of one of N arms: the shared ones, its generator, and those set by users."""
 
     def __init__(self, envs: Any, index: int) -> None:
         self.__dict__.update(_envs=envs, _index=index)
@@ -69,24 +64,12 @@ class ArmRow:
 
 
 def contexts(context: FloatArray, rows: BoolArray) -> Infos:
-    """Infos of some rows whose episodes have begun; zero in the others.
-
-    Args:
-        context: Of all rows. Shape (N, c).
-        rows: Which rows. Shape (N,).
-    """
+    """Infos of some rows whose episodes have begun; zero in the others. Shapes (N, c) and (N,)."""
     return {"context": np.where(rows[:, None], context, 0.0), "_context": rows.copy()} if context.size else {}
 
 
 def infos_of(out: Outcome, rows: BoolArray, made: npt.NDArray[np.int64], scenario: Scenario) -> Infos:
-    """The infos of some rows; zero in the others.
-
-    Args:
-        out: After a step.
-        rows: Which rows. Shape (N,).
-        made: Steps made in the episodes. Shape (N,).
-        scenario: The tracking problem.
-    """
+    """The infos of some rows after a step; zero in the others. Shapes (N,)."""
     if not rows.any():
         return {}
     numbers = np.where(rows, np.stack([getattr(out, key) for key in NUMBERS]), 0.0)
@@ -108,12 +91,7 @@ def infos_of(out: Outcome, rows: BoolArray, made: npt.NDArray[np.int64], scenari
 
 
 def lost_rows(out: Outcome, lost_distance: float | None) -> BoolArray:
-    """Rows that have lost their track, or whose bodies have touched; none without a distance. Shape (N,).
-
-    Args:
-        out: After a step.
-        lost_distance: In [m], None for never.
-    """
+    """Rows that have lost their track, or whose bodies have touched; none without a distance in [m]. Shape (N,)."""
     if lost_distance is None:
         return np.zeros(len(out.position_error), dtype=np.bool_)
     lost: BoolArray = out.position_error > lost_distance
@@ -121,12 +99,7 @@ def lost_rows(out: Outcome, lost_distance: float | None) -> BoolArray:
 
 
 def last_observations(seen: Observation, rows: BoolArray) -> npt.NDArray[np.object_]:
-    """One observation a row, in the layout of `final_obs`; None in the other rows.
-
-    Args:
-        seen: The observation of all rows.
-        rows: Which rows. Shape (N,).
-    """
+    """One observation a row, in the layout of `final_obs`; None in the other rows. Shape (N,)."""
     out = np.full(len(rows), None, dtype=object)
     for row in np.flatnonzero(rows):
         out[row] = {key: value[row].copy() for key, value in seen.items()}

@@ -22,18 +22,9 @@ def action_space(scenario: Scenario) -> spaces.Box:
 def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -> spaces.Dict:
     """The observation space; its bounds follow from start, limits, number of steps and reach.
 
-    Args:
-        scenario: The tracking problem.
-        preview: As in the environment.
-        commands: h, the number of past commands shown.
-
-    Returns:
-        Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,); where sensors are slow or late
-        q_age (1,) and pose_age (1,); where commands are shown commands (h, n), and where obstacles
-        move or differ from episode to episode obstacles (o, 16).
-
-    Raises:
-        InvalidInputError: The preview is not valid.
+    Boxes of float64: q (n,), qdot (n,), pose (m,), nominal (p, m), remaining (1,); where sensors are slow or late q_age
+    (1,) and pose_age (1,); where h commands are shown commands (h, n), and where obstacles move or differ from episode
+    to episode obstacles (o, 16).
     """
     ahead = offsets(preview)
     q = SLACK * scenario.joint_bound()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -28,20 +28,7 @@ SMALLEST, LARGEST = 1e-12, 1e12
 def float_array(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
 ) -> FloatArray:
-    """A fresh, C-contiguous float64 copy of finite numbers.
-
-    Args:
-        name: Name of the value in messages.
-        value: Anything that NumPy can cast to float64 without losing its meaning.
-        shape: Required shape, None for any length; any shape by default.
-        at_most: Largest absolute value.
-
-    Returns:
-        The copy. Shape as given.
-
-    Raises:
-        InvalidInputError: The value is no array of numbers, has another shape, is not finite or too large.
-    """
+    """A fresh, C-contiguous float64 copy of finite numbers; in a shape None is any length, `at_most` is absolute."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiub":
@@ -73,11 +60,7 @@ def read_only(array: FloatArray) -> FloatArray:
 
 
 def per_joint(name: str, value: npt.ArrayLike, n: int, *, at_most: float = math.inf) -> FloatArray:
-    """One number for all joints, or one a joint, as a read-only array of shape (n,).
-
-    Raises:
-        InvalidInputError: There is neither one number nor one a joint, or one is not finite or too large.
-    """
+    """One number for all joints, or one a joint, as a read-only array of shape (n,)."""
     array = frozen_array(name, value, at_most=at_most)
     return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
 
@@ -96,11 +79,7 @@ def number(
     at_most: float | None = None,
     below: float | None = None,
 ) -> float:
-    """A finite number within its bounds.
-
-    Raises:
-        InvalidInputError: The value is no finite number, or outside the bounds.
-    """
+    """A finite number within its bounds."""
     bound = _range(above, at_least, at_most, below)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {shortened(value)}.")
@@ -120,20 +99,17 @@ def number(
 
 
 def signed(name: str, value: float) -> float:
-    """A number of either sign, not beyond :data:`LARGEST`.
-
-    Raises:
-        InvalidInputError: The value is no finite number, or too large.
-    """
+    """A number of either sign, not beyond :data:`LARGEST`."""
     return number(name, value, at_least=-LARGEST, at_most=LARGEST)
 
 
-def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = None) -> int:
-    """A whole number within its bounds.
+def positive(name: str, value: float) -> float:
+    """A number from :data:`SMALLEST` to :data:`LARGEST`."""
+    return number(name, value, at_least=SMALLEST, at_most=LARGEST)
 
-    Raises:
-        InvalidInputError: The value is no whole number, or outside the bounds.
-    """
+
+def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = None) -> int:
+    """A whole number within its bounds."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or value < at_least or (at_most is not None and value > at_most):
         bounds = f"of at least {at_least}" if at_most is None else f"from {at_least} to {at_most}"
@@ -142,11 +118,7 @@ def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = 
 
 
 def check_sizes(name: str, value: object) -> None:
-    """Checks that no number is absurdly large or small, in sequences, tables and the fields of dataclasses, too.
-
-    Raises:
-        InvalidInputError: One is not 0 and outside ±[SMALLEST, LARGEST], or not a number.
-    """
+    """Checks that no number is absurdly large or small, in sequences, tables and the fields of dataclasses, too."""
     if dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):
             check_sizes(field.name, getattr(value, field.name))
@@ -163,11 +135,7 @@ def check_sizes(name: str, value: object) -> None:
 
 
 def one_a_row(name: str, given: Any, rows: int) -> list[int | None]:
-    """Whole numbers of at least 0 for N rows: one for all of them, or one a row; None where there is none.
-
-    Raises:
-        InvalidInputError: They are no such numbers, or not one a row.
-    """
+    """Whole numbers of at least 0 for N rows: one for all of them, or one a row; None where there is none."""
     numbers = list(given) if isinstance(given, (tuple, list, np.ndarray)) else [given] * rows
     if len(numbers) != rows:
         raise InvalidInputError(f"{name}: expected {rows} numbers, one a row, got {len(numbers)}.")
@@ -175,35 +143,19 @@ def one_a_row(name: str, given: Any, rows: int) -> list[int | None]:
 
 
 def flag(name: str, value: bool) -> bool:
-    """A truth value.
-
-    Raises:
-        InvalidInputError: The value is neither.
-    """
+    """A truth value."""
     if not isinstance(value, bool):
         raise InvalidInputError(f"{name}: expected true or false, got {value!r}.")
     return value
 
 
 def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
-    """A rotation matrix, made exactly orthogonal if it is within 1e-6 of one, and read-only.
-
-    Raises:
-        InvalidInputError: It is no orthogonal matrix with determinant 1.
-    """
+    """A rotation matrix, made exactly orthogonal if it is within 1e-6 of one, and read-only."""
     return read_only(rotation_matrices(name, float_array(name, value, (3, 3))))
 
 
 def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does, as a fresh array.
-
-    Args:
-        name: Name of the value in messages.
-        value: The matrices. Shape (..., 3, 3).
-
-    Raises:
-        InvalidInputError: One is no orthogonal matrix with determinant 1; the message has it.
-    """
+    """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does. Fresh, of shape (..., 3, 3)."""
     matrices = float_array(name, value, at_most=LARGEST)
     if matrices.shape[-2:] != (3, 3):
         raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")
@@ -221,22 +173,14 @@ def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:
-    """Checks that all names are available.
-
-    Raises:
-        UnknownNameError: One is not; the message has the nearest match.
-    """
+    """Checks that all names are available."""
     available = tuple(available)
     for name in given:
         known_name(kind, name, available)
 
 
 def known_name(kind: str, name: object, available: Iterable[str]) -> None:
-    """Checks that a name is available; anything but a text is not.
-
-    Raises:
-        UnknownNameError: It is not; the message has the nearest match.
-    """
+    """Checks that a name is available; anything but a text is not."""
     available = tuple(available)
     if not isinstance(name, str) or name not in available:
         raise UnknownNameError(kind, name, available)
@@ -246,12 +190,7 @@ class Frozen:
     """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled."""
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one.
-
-        Raises:
-            UnknownNameError: There is no field of that name.
-            InvalidInputError: A new value is refused.
-        """
+        """A copy with some fields changed, checked like a new one."""
         known_names(f"field of {type(self).__name__}", changes, self._fields())
         return type(self)(**{**self._fields(), **changes})
 
@@ -259,6 +198,10 @@ class Frozen:
         """Sets checked fields while the object is made."""
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _settle_by(self, check: Callable[..., Any], *names: str, **bounds: Any) -> None:
+        """Sets fields to what a check of this module, such as :func:`number`, makes of them."""
+        self._settle(**{name: check(name, getattr(self, name), **bounds) for name in names})
 
     def _fields(self) -> Mapping[str, Any]:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}  # type: ignore[arg-type]

@@ -19,6 +19,16 @@ def optima_of_our_own(tmp_path_factory):
 
 
 @pytest.fixture
+def own_registries(monkeypatch):
+    """What a test registers is gone after it."""
+    from ikgym import arms, scenarios
+
+    for registry in (arms._registry, scenarios._registry):
+        monkeypatch.setattr(registry, "_makers", dict(registry._makers))
+        monkeypatch.setattr(registry, "_made", dict(registry._made))
+
+
+@pytest.fixture
 def one_thread():
     """Torch's threads spend their time waiting for each other in networks this small."""
     import torch

@@ -28,13 +28,14 @@ class Judge:
     def __call__(self, q, obstacles):
         """In [m], at most :data:`FAR`. Shapes (k, n), (k or 1, o, 16) and (k,)."""
         solids = np.concatenate([self.placed(q), np.broadcast_to(obstacles, (len(q), *obstacles.shape[1:]))], axis=1)
-        centres, radii = solids[..., 9:12], np.linalg.norm(solids[..., 12:15], axis=2) + solids[..., 15]
-        radii[solids[..., 12] < 0.0] = np.inf  # half-spaces
-        first, second = self.pairs.T
-        apart = np.linalg.norm(centres[:, first] - centres[:, second], axis=2) - radii[:, first] - radii[:, second]
-        out = np.full(len(q), FAR)
-        for row, pair in np.argwhere(apart < FAR):
-            out[row] = min(out[row], self.distance(*solids[row, self.pairs[pair]]))
+        first, second = solids[:, self.pairs[:, 0]], solids[:, self.pairs[:, 1]]
+        bounds = np.maximum(_bound(first, second), _bound(second, first))
+        out, order = np.full(len(q), FAR), np.argsort(bounds, axis=1)
+        for row, pairs in enumerate(order):
+            for pair in pairs:
+                if bounds[row, pair] >= out[row]:
+                    break
+                out[row] = min(out[row], self.distance(first[row, pair], second[row, pair]))
         return out
 
     def placed(self, q):
@@ -51,6 +52,14 @@ class Judge:
         (first, at), (second, there) = _shape(one), _shape(other)
         self.result.clear()
         return coal.distance(first, at, second, there, self.request, self.result)
+
+
+def _bound(one, other):
+    """The distance of a sphere around the other solid from the first one in [m]. Shapes (k, p, 16), (k, p)."""
+    away = np.einsum("kpji,kpj->kpi", one[..., :9].reshape(*one.shape[:2], 3, 3), other[..., 9:12] - one[..., 9:12])
+    beyond = np.linalg.norm(np.maximum(np.abs(away) - one[..., 12:15], 0.0), axis=2) - one[..., 15]
+    radii = np.where(other[..., 12] < 0.0, np.inf, np.linalg.norm(other[..., 12:15], axis=2) + other[..., 15])
+    return np.where(one[..., 12] < 0.0, away[..., 2], beyond) - radii  # half-spaces have no edges
 
 
 def _shape(solid):

@@ -3,14 +3,7 @@
 import os
 import signal
 
-import gymnasium as gym
-
 from baselines.training import seeds
-
-
-def random_env():
-    """An environment with random episodes."""
-    return gym.make("ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
 
 
 def dies_with_seed_7(one, attempt=seeds.attempt):

@@ -52,6 +52,8 @@ QUATERNIONS = [[1.0, 0, 0, 0], [0.8, 0.6, 0, 0], [0.6, 0.8, 0, 0]]
 LINE = paths.Line([0, 0, 0], [1, 2, 3])
 HELIX = Helix([0, 0, 0], 1, 1, 1)
 BODIES = Bodies(("upper", "hand"), (3, 7), [[0, 0, 0], [0, 0, -0.1]], [[0, 0, 0.1], [0, 0, -0.1]], (0.1, 0.05))
+RETIMED = RetimedTrajectory(PathTrajectory(LINE, Quintic(1, 1)), [0.0, 2.0], [0.0, 1.0], [0.0, 1.0])
+BOXES = RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2, 0.2], ignored=("hand",))
 GOOD = (
     ARM,
     BODIES,
@@ -59,7 +61,7 @@ GOOD = (
     Capsule("capsule", [1, 0, 0], [1, 0, 1], 0.1, HELIX, ("hand",)),
     Box("box", [1, 0, 0], [0.1, 0.2, 0.3], np.eye(3), HELIX, ("hand",)),
     HalfSpace("floor", [0, 0, 0], [0, 0, 1], HELIX, ("hand",)),
-    RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2, 0.2], ignored=("hand",)),
+    BOXES,
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
     ikgym.ProximityCost(0.1),
@@ -74,7 +76,7 @@ GOOD = (
     PathTrajectory(LINE, Quintic(1, 1), FixedOrientation(np.eye(3))),
     PublishedPath("rlitg-zig", 0.2),
     RandomPublishedPath("rlitg-random-00", 0.2),
-    RetimedTrajectory(PathTrajectory(LINE, Quintic(1, 1)), [0.0, 2.0], [0.0, 1.0], [0.0, 1.0]),
+    RETIMED,
     LINE,
     paths.Circle([0, 0, 0], 0.3),
     paths.CircularHelix([0, 0, 0], 0.3, pitch=0.1),
@@ -266,6 +268,15 @@ REFUSED = [
     ("apart", lambda: paths.SplinePath([[1, 0, 0], [0, 0, 0], [0, 0, 0]])),
     *(("straight back", lambda make=make: make()) for make in (
         lambda: paths.SplinePath(STRAIGHT_BACK), lambda: paths.Polyline(STRAIGHT_BACK, 0.1),
+    )),
+    *((word, lambda field=field, x=x: BOXES.replace(**{field: x})) for word, field, x in (
+        ("count of obstacle", "count", 10**6), ("lower <= upper", "lower", [0, 0, 2]),
+        ("smallest.*above 0", "smallest", [0, 0.1, 0.1]), ("within of obstacle", "within", 0.01),
+    )),
+    *((word, lambda field=field, x=x: RETIMED.replace(**{field: x})) for word, field, x in (
+        ("rise, got 0", "times", [0, 0]), ("0 s as the first, got 1", "times", [1, 2]), ("from 2 to", "times", [0]),
+        ("never fall, got -1", "progress", [1, 0]), ("at least 0, got -1", "rates", [0, -1]),
+        ("not random", "trajectory", RandomSinusoid(ONES)),
     )),
     ("start and end", lambda: paths.Line([1, 2, 3], [1, 2, 3])),
     *(("corner_radius|at most 1 m", lambda x=x: paths.Polyline(POINTS, x)) for x in (2.0, 0.0)),

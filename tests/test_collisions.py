@@ -6,7 +6,6 @@ import pytest
 
 import ikgym
 from ikgym.arms.bodies import Bodies
-from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 from ikgym.plant import Plant
 from ikgym.trajectories import StraightLine
@@ -54,15 +53,6 @@ def wild(rows, steps, seed=0):
     rng = np.random.default_rng(seed)
     drift = rng.uniform(-1, 1, (1, rows, 7))
     return np.clip(drift + 0.3 * rng.normal(size=(steps, rows, 7)), -1, 1).astype(np.float32)
-
-
-def test_info_has_the_clearance_of_the_arm(scenario):
-    env = gym.make("RedundantIK-v0", scenario=scenario)
-    env.reset(seed=1)
-    for action in wild(1, 30)[:, 0]:
-        seen, _, terminated, _, info = env.step(action)
-        assert info["clearance"] == scenario.arm.clearance(seen["q"], OBSTACLES)[0]
-        assert not terminated
 
 
 def test_bodies_belong_to_the_arm_that_moves(scenario):
@@ -151,13 +141,6 @@ def test_without_collisions_nothing_is_stopped_and_costs_are_the_same(scenario):
         env.reset(seed=2)
         rewards.append([env.step(action)[1] for action in wild(1, 100)[:, 0]])
     assert rewards[0] == rewards[1] == rewards[2]
-
-
-def test_a_start_that_touches_is_refused_by_name(scenario):
-    blocked = scenario.replace(obstacles=[Box("crate", [0.3, 0, 0.5], [0.6, 0.6, 0.6])])
-    env = gym.make("RedundantIK-v0", scenario=blocked)
-    with pytest.raises(InvalidInputError, match=r"'(upper|lower|tool)' and 'crate' with -.* mm .* `ignored`"):
-        env.reset(seed=0)
 
 
 def test_a_learner_is_ended_by_a_collision(scenario):

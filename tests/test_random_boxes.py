@@ -1,15 +1,14 @@
 """Boxes that are drawn: clear of the motion, near to it, and the same however they are drawn."""
 
-import coal
 import gymnasium as gym
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import ikgym
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles.random_boxes import RandomBoxes
 from tests.comparison import identical
+from tests.judge import Judge
 
 SCENARIO = ikgym.scenarios.get("panda-clutter-random")
 (BOXES,) = SCENARIO.obstacles
@@ -21,53 +20,16 @@ def reference(seed, steps=SCENARIO.steps + 1):
 
 def test_the_motion_keeps_its_distance_from_each_box_and_comes_near_it():
     """coal is the judge where it comes nearest, also between the steps."""
-    bodies = SCENARIO.arm.bodies
+    bodies, judge = SCENARIO.arm.bodies, Judge(SCENARIO)
     arm = SCENARIO.arm.replace(bodies=bodies.replace(ignored=[(a, b) for a in bodies.names for b in bodies.names]))
     for seed in (0, 1, 2):
         path = reference(seed, 10 * SCENARIO.steps + 1)
         for box in SCENARIO.obstacles_of(seed):
             distances, pairs = arm.clearance(path, [box])
             for i in np.argsort(distances)[:200:50]:
-                np.testing.assert_allclose(by_coal(arm, path[i], pairs[i, 0], box), distances[i], atol=1e-7)
+                body = judge.placed(path[[i]])[0, pairs[i, 0]]
+                np.testing.assert_allclose(judge.distance(body, box.numbers()), distances[i], atol=1e-7)
             assert BOXES.margin <= distances.min() <= BOXES.within
-
-
-def by_coal(arm, q, body, box):
-    """The distance of a body from a box, by coal."""
-    start, end = ends(arm, q, body)
-    length = np.linalg.norm(end - start)
-    turned = Rotation.align_vectors([(end - start) / length], [[0.0, 0.0, 1.0]])[0].as_matrix()
-    capsule = coal.Capsule(arm.bodies.radii[body], length), coal.Transform3s(turned, 0.5 * (start + end))
-    other = coal.Box(*box.size), coal.Transform3s(np.array(box.rotation), np.array(box.position))
-    return coal.distance(*capsule, *other, coal.DistanceRequest(), coal.DistanceResult())
-
-
-def ends(arm, q, body):
-    """Both ends of a body's segment in the base frame."""
-    link = arm.bodies.links[body]
-    points = []
-    for point in (arm.bodies.starts[body], arm.bodies.ends[body]):
-        part = arm.replace(
-            bodies=ikgym.arms.bodies.Bodies(),
-            **{name: getattr(arm, name)[:link] for name in FIELDS},
-            tool=point,
-            tool_rotation=np.eye(3),
-        )
-        points.append(part.forward(q[:link])[1])
-    return points
-
-
-FIELDS = (
-    "offsets",
-    "axes",
-    "prismatic",
-    "lower",
-    "upper",
-    "velocity_limit",
-    "acceleration_limit",
-    "home",
-    "joint_names",
-)
 
 
 def test_single_and_vector_environments_draw_the_same_boxes():
@@ -101,22 +63,6 @@ def test_an_episode_with_its_boxes_fixed_is_the_same(tmp_path):
     SCENARIO.save(tmp_path / "boxes.toml")
     again = ikgym.scenarios.load(tmp_path / "boxes.toml")
     assert identical(again.obstacles_of(2)[9].position, SCENARIO.obstacles_of(2)[9].position)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"count": 0}, "count of obstacle 'box'"),
-        ({"count": 10**6}, "count of obstacle 'box'"),
-        ({"smallest": [0.0, 0.1, 0.1]}, "smallest of obstacle 'box': expected numbers above 0"),
-        ({"lower": [0.0, 0.0, 2.0]}, "expected lower <= upper"),
-        ({"within": 0.01}, "within of obstacle 'box'"),
-        ({"margin": float("nan")}, "margin of obstacle 'box'"),
-    ],
-)
-def test_bad_input(changes, message):
-    with pytest.raises(InvalidInputError, match=message):
-        BOXES.replace(**changes)
 
 
 def test_no_room_and_no_motion():

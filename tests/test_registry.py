@@ -6,14 +6,8 @@ import ikgym
 from ikgym import arms, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 
+pytestmark = pytest.mark.usefixtures("own_registries")
 both = pytest.mark.parametrize("module", [arms, scenarios])
-
-
-@pytest.fixture(autouse=True)
-def own_registries(monkeypatch):
-    for module in (arms, scenarios):
-        monkeypatch.setattr(module._registry, "_makers", dict(module._registry._makers))
-        monkeypatch.setattr(module._registry, "_made", dict(module._registry._made))
 
 
 @both

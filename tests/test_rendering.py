@@ -65,15 +65,12 @@ def count_paintings(monkeypatch):
     return painted
 
 
-#: One scenario an arm, and one with held points.
-ONE_AN_ARM = {
-    *("varga7-fast", "varga7-random", "faitli3-regular", "khan8-q1", "khan8-q7q8", "planar2-bent", "zhang3-helix"),
-    *("zhang6-lspb", "panda-circle", "tiago-raster", "iiwa14-random"),
-}
+#: Joints that slide and turn, held points, in the plane and in space.
+ONE_OF_EACH = ("varga7-random", "khan8-q1", "planar2-bent", "panda-circle", "tiago-raster")
 
 
-@pytest.mark.parametrize("name", sorted(ONE_AN_ARM))
-def test_every_arm_and_path_gives_a_picture_of_the_same_even_size(name):
+@pytest.mark.parametrize("name", ONE_OF_EACH)
+def test_arms_and_paths_give_a_picture_of_the_same_even_size(name):
     env = environment(name)
     move(env)
     picture = env.render()
@@ -86,26 +83,19 @@ def test_every_arm_and_path_gives_a_picture_of_the_same_even_size(name):
 def test_a_picture_changes_with_the_arm_and_only_with_it():
     env = environment()
     pictures = [env.render()]
-    for _ in range(3):
+    for _ in range(2):
         move(env)
         pictures.append(env.render())
-        np.testing.assert_array_equal(env.render(), pictures[-1])
+    np.testing.assert_array_equal(env.render(), pictures[-1])
     for before, after in itertools.pairwise(pictures):
         assert (before != after).any()
-
-
-def test_restoring_the_background_gives_the_same_pixels_as_drawing_all_anew():
-    env = environment()
-    for _ in range(4):
-        move(env)
-        quick = env.render()
-    renderer_of(env)._scene._background = None
-    np.testing.assert_array_equal(env.render(), quick)
+    renderer_of(env)._scene._background = None  # all is drawn anew
+    np.testing.assert_array_equal(env.render(), pictures[-1])
 
 
 def test_a_second_episode_looks_as_if_it_were_the_first():
     env, fresh = environment("varga7-random"), environment("varga7-random")
-    for _ in range(4):
+    for _ in range(2):
         move(env, 1.0)
         env.render()
     for one in (env, fresh):
@@ -184,10 +174,7 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
 
 #: Arms, joint coordinates and errors that are drawn at the worst: each value once, not all together, since the picture
 #: of the arm and the curves of its errors do not know each other.
-WORST = [
-    *(("varga7", 0.0, error) for error in (0.0, 1e-300, 1e300, np.inf)),
-    *(("varga7", -1e9, np.inf), ("puma560", 1e6, 1e-300)),
-]
+WORST = [*(("varga7", q, error) for q, error in ((0.0, 0.0), (0.0, 1e300), (-1e9, np.inf), (1e6, 1e-300)))]
 
 
 @pytest.mark.parametrize(("name", "q", "error"), WORST)
@@ -239,14 +226,14 @@ def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
 def test_a_video_can_be_recorded(tmp_path):
     pytest.importorskip("moviepy")
     ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
-    env = gym.make("RedundantIK-v0", scenario=short(), render_mode="rgb_array")
+    env = gym.make("RedundantIK-v0", scenario=short(steps=4), render_mode="rgb_array")
     env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
     env.reset()
-    for _ in range(STEPS):
+    for _ in range(4):
         *_, truncated, _ = move(env)
     assert truncated
     frames = np.array(env.recorded_frames)
-    assert frames.shape == (STEPS + 1, HEIGHT, WIDTH, 3)
+    assert frames.shape == (5, HEIGHT, WIDTH, 3)
     assert all((a != b).any() for a, b in itertools.pairwise(frames))
     env.close()
     (video,) = tmp_path.glob("videos/*.mp4")

@@ -9,7 +9,6 @@ import typing
 
 import numpy as np
 import pytest
-from gymnasium.utils import seeding
 
 import ikgym
 import ikgym.simulator as simulator_module
@@ -84,20 +83,6 @@ def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview)
         assert identical(whole.step(actions, stepping).numbers, in_blocks.step(actions, stepping).numbers)
     for row in range(ROWS):
         assert identical(whole.nominal_positions(row), in_blocks.nominal_positions(row))
-
-
-@pytest.mark.parametrize("name", ["sinusoids", "splines"])
-def test_blocks_show_the_episodes_nominals(name):
-    """Against the public scenario, which knows nothing of blocks."""
-    scenario = random_scenarios()[name]
-    simulator = Simulator(scenario, 2, 3, memory=0)
-    simulator.reset(np.ones(2, dtype=bool), [seeding.np_random(seed)[0] for seed in (5, 6)])
-    for k in range(1, scenario.steps + 1):
-        shown = simulator.step(np.zeros((2, 7))).nominal
-        for row, seed in enumerate((5, 6)):
-            assert identical(shown[row], scenario.nominal(seed, 3)[k + 1 : k + 4])
-    for row, seed in enumerate((5, 6)):
-        assert identical(simulator.nominal_positions(row), scenario.nominal(seed)[:, -3:])
 
 
 @pytest.mark.parametrize("name", ["panda-random", "varga7-random"])

@@ -27,10 +27,6 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
         file: A TOML file with one table an arm, whose keys are the fields of :class:`ikgym.Arm`. Axes may be words such
             as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields; bodies are
             that one's and its own.
-
-    Raises:
-        OSError: The file cannot be read.
-        tomllib.TOMLDecodeError: It is no TOML.
     """
     tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8"))
     return {name: functools.partial(_arm, name, tables) for name in tables}

@@ -16,11 +16,7 @@ ROUNDING = 4e-16
 
 
 def unit_axes(name: str, axes: FloatArray) -> FloatArray:
-    """Axes of exactly unit length, read-only. Shape (n, 3).
-
-    Raises:
-        InvalidInputError: A length differs from 1 by more than 1e-6.
-    """
+    """Axes of exactly unit length, read-only. Shape (n, 3)."""
     lengths: FloatArray = np.linalg.norm(axes, axis=1)
     for i, length in enumerate(lengths):
         if abs(length - 1.0) > UNIT_TOLERANCE:
@@ -35,11 +31,7 @@ def unit_axes(name: str, axes: FloatArray) -> FloatArray:
 
 
 def truth_values(name: str, prismatic: Any, n: int) -> tuple[bool, ...]:
-    """Which joints are prismatic, one entry a joint.
-
-    Raises:
-        InvalidInputError: They are no n truth values.
-    """
+    """Which joints are prismatic, one entry a joint."""
     values = (tuple(prismatic) or (False,) * n) if isinstance(prismatic, Iterable) else ()
     if len(values) != n or not all(isinstance(value, (bool, np.bool_)) for value in values):
         raise InvalidInputError(
@@ -54,11 +46,7 @@ def numbered_joints(n: int) -> tuple[str, ...]:
 
 
 def joint_names(name: str, given: Sequence[str], n: int) -> tuple[str, ...]:
-    """Names of the joints.
-
-    Raises:
-        InvalidInputError: They are no n different texts.
-    """
+    """Names of the joints."""
     names = (tuple(given) or numbered_joints(n)) if isinstance(given, (tuple, list)) else ()
     texts = [one for one in names if isinstance(one, str) and one]
     if not len(texts) == len(set(texts)) == len(names) == n:
@@ -69,11 +57,7 @@ def joint_names(name: str, given: Sequence[str], n: int) -> tuple[str, ...]:
 def limits(
     name: str, field: str, value: npt.ArrayLike | None, n: int, default: float, *, positive: bool = False
 ) -> FloatArray:
-    """Limits of the joints, which may be infinite, read-only. Shape (n,).
-
-    Raises:
-        InvalidInputError: They are no n numbers, or not positive where they must be.
-    """
+    """Limits of the joints, which may be infinite, read-only. Shape (n,)."""
     if value is None:
         return read_only(np.full(n, default))
     try:

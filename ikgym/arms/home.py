@@ -22,20 +22,9 @@ def from_home(
 ) -> Arm:
     """An arm from the home pose of its joints and of its tool, all in the base frame.
 
-    Since all link frames are parallel to the base at q = 0, the offsets are the differences of the joints' points, and
-    the fixed rotations between links combine to the tool's home orientation.
-
-    Args:
-        name: Name of the arm.
-        axes: The joints' unit axes at q = 0. Shape (n, 3).
-        points: A point on each axis at q = 0 in [m]. Shape (n, 3).
-        prismatic: True where a joint is prismatic, one entry a joint.
-        rotation: Orientation of the tool at q = 0. Shape (3, 3).
-        position: Tool point at q = 0 in [m]. Shape (3,).
-        fields: Other fields of :class:`ikgym.Arm`.
-
-    Raises:
-        InvalidInputError: A shape, an axis, the orientation or a limit is wrong.
+    Axes (n, 3) are of unit length; points (n, 3) are on the axes, in [m]. Since all link frames are parallel to the
+    base at q = 0, the offsets are the differences of the points, and the fixed rotations between links combine to the
+    tool's home orientation.
     """
     offsets = np.diff(points, axis=0, prepend=np.zeros((1, 3)))
     return Arm(name, offsets, axes, prismatic, tool=position - points[-1], tool_rotation=rotation, **fields)

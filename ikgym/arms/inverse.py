@@ -68,15 +68,8 @@ def inverse(
 def alike(arm: Any, chains: Chain, q: FloatArray, *, oriented: bool) -> FloatArray:
     """Joint coordinates that give other arms the poses of an arm, the nearest within its limits.
 
-    Args:
-        arm: The arm with the known postures.
-        chains: The k other arms, nearly the same, with a leading axis of k; or one for all, with an axis of 1.
-        q: The arm's joint coordinates within its limits, in [rad] or [m]. Shape (k, n).
-        oriented: Whether orientations matter.
-
-    Returns:
-        Joint coordinates, as near to the poses as the other arms get, without the last bits in which processors
-        differ. Shape (k, n).
+    The other arms are nearly the same: k of them, or one for all, by the leading axis of the chains. Results, of shape
+    (k, n) as the postures within the limits, are without the last bits in which processors differ.
     """
     ranges, length, _ = _search(arm)
     rotations, positions = arm.forward(q)

@@ -20,18 +20,7 @@ BOUNDS = ("lower", "upper", "velocity_limit", "acceleration_limit")
 
 
 def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
-    """The joint velocities of an action of 1: those given, else the arm's limits.
-
-    Args:
-        arm: The arm.
-        given: A number, or one a joint, in [rad/s] or [m/s]; None for the limits.
-
-    Returns:
-        Joint velocities in [rad/s] or [m/s], read-only. Shape (n,).
-
-    Raises:
-        InvalidInputError: Nothing is given and a joint has no limit; or a number is too small or too large.
-    """
+    """The joint velocities of an action of 1 in [rad/s] or [m/s]: those given, else the arm's limits. Shape (n,)."""
     without = [repr(name) for name, limit in zip(arm.joint_names, arm.velocity_limit, strict=True) if limit == np.inf]
     if given is None and without:
         raise InvalidInputError(
@@ -60,14 +49,8 @@ def middle(arm: Arm) -> tuple[npt.NDArray[np.bool_], FloatArray]:
 def limit_rows(arm: Arm, fastest: FloatArray, dt: float) -> FloatArray:
     """The limits of an arm as kernels take them, see :mod:`ikgym.kernels.limits`.
 
-    Args:
-        arm: The arm.
-        fastest: The largest joint velocities in [rad/s] or [m/s]. Shape (n,).
-        dt: Δt in [s].
-
-    Returns:
-        Lower and upper limits in [rad] or [m], the largest velocities, and how much they change at most in one step, in
-        [rad/s] or [m/s]. Shape (4, n), or (0, n) where the arm has no limit.
+    Lower and upper limits in [rad] or [m], the largest velocities, and how much they change at most in one step of Δt,
+    in [rad/s] or [m/s]. Shape (4, n), or (0, n) where the arm has no limit.
     """
     if not arm.limited:
         return np.empty((0, arm.joints))

@@ -22,21 +22,9 @@ def rows(
     times: FloatArray,
     generators: Sequence[np.random.Generator],
 ) -> FloatArray:
-    """The obstacles at the start of several episodes.
+    """The obstacles at the start of k episodes, from their rows before any is drawn. Shapes (k, o, 16), (o, 16).
 
-    Args:
-        arm: The arm of the data sheet.
-        obstacles: The obstacles.
-        first: Their rows before any is drawn. Shape (o, 16).
-        episodes: Trajectories of the k episodes.
-        times: Times of the steps in [s]. Shape (t,).
-        generators: One an episode; touched only where an obstacle is drawn.
-
-    Returns:
-        Shape (k, o, 16).
-
-    Raises:
-        InvalidInputError: There is no room for an obstacle in an episode.
+    Generators, one an episode, are touched only where an obstacle is drawn; times are those of the steps in [s].
     """
     out, at = np.tile(first, (len(episodes), 1, 1)), 0
     if not any(one.random for one in obstacles):
@@ -52,12 +40,7 @@ def rows(
 
 
 def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
-    """Obstacles of one episode, none of them random.
-
-    Args:
-        obstacles: The obstacles of the scenario.
-        numbers: Their rows in the episode. Shape (o, 16).
-    """
+    """Obstacles of one episode, none of them random, from their rows of shape (o, 16)."""
     out: list[Obstacle] = []
     at = 0
     for one in obstacles:
@@ -67,13 +50,7 @@ def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle,
 
 
 def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The smallest and the largest numbers of obstacles in any episode.
-
-    Args:
-        obstacles: The obstacles.
-        low: The smallest numbers of those that are not drawn; others do not matter. Shape (o, 16).
-        high: The largest ones. Shape (o, 16).
-    """
+    """The smallest and the largest numbers of obstacles in any episode, from those of obstacles that are not drawn."""
     low, high, at = low.copy(), high.copy(), 0
     for one in obstacles:
         if isinstance(one, RandomBoxes):

@@ -39,11 +39,8 @@ class Closest(NamedTuple):
 def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> Closest:
     """The bodies of an arm and their closest pair.
 
-    Args:
-        arm: The arm.
-        q: Joint coordinates in [rad] or [m]. Shape (N, n).
-        boxes: The obstacles in each configuration, or once for all. Shape (N, o, 16) or (1, o, 16).
-        checked: Whether a body may not touch an obstacle. Shape (o, k).
+    Obstacles, of shape (N or 1, o, 16), are given for each configuration, of shape (N, n), or once for all; `checked`
+    says whether a body may not touch an obstacle, in shape (o, k).
     """
     from ikgym.kernels.bodies.closest import closest_rows  # scenarios without bodies need none of its kernels
 
@@ -55,15 +52,9 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
 
 
 def solids_of(obstacles: Sequence[Obstacle], times: FloatArray, model: Arm) -> FloatArray:
-    """Obstacles at some times; those that are drawn as they are before.
+    """Obstacles at some times in [s], of shape (k, o, 16), or (1, o, 16) where none moves.
 
-    Args:
-        obstacles: Those of a scenario, or of an episode, see :meth:`ikgym.Scenario.obstacles_of`.
-        times: In [s]. Shape (k,).
-        model: The arm through whose kinematics motions are mapped that are joint paths.
-
-    Returns:
-        Shape (k, o, 16), or (1, o, 16) where none moves.
+    Motions that are joint paths are mapped through the kinematics of the model. Obstacles that are drawn are as before.
     """
     along = [one.along(times, model).reshape(-1, one.count, 16) for one in obstacles]
     rows = max(map(len, along), default=1)
@@ -78,14 +69,9 @@ def on_links(bodies: Bodies) -> FloatArray:
 
 
 def link_frames(arm: Arm, q: FloatArray) -> FloatArray:
-    """The frames of the links of an arm, that of the base first.
+    """The frames of the links of an arm, that of the base first: rotations row by row, and positions in [m].
 
-    Args:
-        arm: The arm.
-        q: Joint coordinates in [rad] or [m]. Shape (N, n).
-
-    Returns:
-        Rotations, row by row, and positions in [m]. Shape (N, n + 1, 12).
+    Shapes (N, n) of joint coordinates, and (N, n + 1, 12).
     """
     rotation, position = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
     frames = [(rotation, position)]
@@ -100,11 +86,7 @@ def link_frames(arm: Arm, q: FloatArray) -> FloatArray:
 
 
 def surface(size: FloatArray, stretches: int = STRETCHES) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """The surface of a solid in its own frame, as triangles.
-
-    Args:
-        size: Half of the edges, and the radius, in [m]: the last four numbers of a row. Shape (4,).
-        stretches: Into which a quarter of a circle is divided.
+    """The surface of a solid in its own frame, from half of its edges and its radius, the last four numbers of a row.
 
     Returns:
         Vertices in [m], of shape (v, 3), and the numbers of three of them for each triangle, of shape (t, 3).
@@ -124,14 +106,7 @@ def surface(size: FloatArray, stretches: int = STRETCHES) -> tuple[FloatArray, n
 
 
 def outline(size: FloatArray) -> FloatArray:
-    """Lines on the surface of a solid in its own frame: closed ones, each followed by a row of NaN.
-
-    Args:
-        size: See :func:`surface`.
-
-    Returns:
-        Points in [m]. Shape (p, 3).
-    """
+    """Closed lines on the surface of a solid, each followed by a row of NaN, in [m]; see :func:`surface`. (p, 3)."""
     angles, signs = _circle(size[3], STRETCHES)
     ring = np.stack([np.cos(angles), np.sin(angles)]), np.stack(signs)
     lines = []
@@ -153,12 +128,9 @@ def in_space(solid: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def bounded(solids: FloatArray, edge: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """The same solids, half-spaces as square plates.
+    """The same solids, of shape (..., 16), half-spaces as square plates.
 
-    Args:
-        solids: Shape (..., 16).
-        edge: Half the edge of a plate in [m].
-        centre: The middle of a plate is the point of the face that is closest to this one, in [m]. Shape (3,).
+    The middle of a plate is the point of the face that is closest to `centre`; `edge` is half of its edge, in [m].
     """
     out, normal = solids.copy(), solids[..., 2:9:3]
     above = (normal * (np.asarray(centre) - solids[..., 9:12])).sum(axis=-1, keepdims=True)

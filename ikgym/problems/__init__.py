@@ -54,11 +54,7 @@ NAMES = (
     *OBSTRUCTED,
 )
 #: Methods behind the initial trajectories, and their names in prose.
-METHODS = {
-    "greedy": "greedy IK",
-    "cloning": "behaviour cloning",
-    "reinforcement": "reinforcement learning",
-}
+METHODS = {"greedy": "greedy IK", "cloning": "behaviour cloning", "reinforcement": "reinforcement learning"}
 
 
 class Waypoints(NamedTuple):

@@ -17,12 +17,7 @@ SMALLEST, LARGEST = 1e-9, 1e99  # errors are clipped to this range, in [m] or [r
 class ErrorCurve:
     """An error over time, on a logarithmic axis that grows by whole decades and never shrinks.
 
-    Args:
-        axes: The axes.
-        name: Of the error.
-        unit: Of the error.
-        color: Of the curve.
-        last: Whether these are the lowest axes, which show the times.
+    The lowest axes of several, the last, show the times.
     """
 
     def __init__(self, axes: Any, name: str, unit: str, color: str, *, last: bool) -> None:
@@ -40,26 +35,13 @@ class ErrorCurve:
         axes.tick_params(labelsize=SMALL)
 
     def begin(self, duration: float) -> None:
-        """Begins an episode, with an axis without numbers until errors are known.
-
-        Args:
-            duration: Of the episode, in [s].
-        """
+        """Begins an episode of a duration in [s], with an axis without numbers until errors are known."""
         self._decades = (math.inf, -math.inf)
         self._axes.set(xlim=(0.0, duration), ylim=(1e-2, 1.0))
         self._axes.tick_params(labelbottom=self._last, labelleft=False)
 
     def show(self, time: FloatArray, error: FloatArray, steps: int) -> bool:
-        """Updates the curve.
-
-        Args:
-            time: The times so far in [s]. Shape (k,).
-            error: The errors so far in [m] or [rad]. Shape (k,).
-            steps: Steps of the episode.
-
-        Returns:
-            Whether the axes changed.
-        """
+        """Updates the curve by times in [s] and errors in [m] or [rad] so far, (k,); returns whether axes changed."""
         known = self._decades
         error = error.clip(SMALLEST, LARGEST)
         # An error of 0 at the start would open the axis downwards.

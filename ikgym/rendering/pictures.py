@@ -10,13 +10,7 @@ from ikgym.simulator import Simulator
 
 
 class Pictures:
-    """Records the states of one row, and draws the last one when it is asked for, or at once in a window.
-
-    Args:
-        simulator: The row's simulator.
-        row: Its number.
-        mode: ``"human"`` or ``"rgb_array"``.
-    """
+    """Records the states of one row, and draws the last one when it is asked for, or at once in a window."""
 
     def __init__(self, simulator: Simulator, row: int, mode: str) -> None:
         scenario = simulator.scenario

@@ -46,15 +46,7 @@ FRAME = 0.14
 
 
 class Scene:
-    """The picture and its moving parts.
-
-    Args:
-        figure: The figure.
-        arm: The arm that moves.
-        title: Title of the picture.
-        has_orientation: Whether there is an orientation error to show.
-        surroundings: The obstacles as they are at the start; None if neither they nor bodies are shown.
-    """
+    """The picture and its moving parts, see :class:`ikgym.rendering.Renderer`."""
 
     def __init__(
         self, figure: Figure, arm: Arm, title: str, has_orientation: bool, surroundings: Surroundings | None = None
@@ -73,14 +65,7 @@ class Scene:
         self._base = self._line("base", ls="", marker="^", ms=11, mfc=INK, mec=INK)
         # Dashes show the travel of a prismatic joint, the square (point 1 of each 3) its position.
         self._rails = self._line(
-            "prismatic joint",
-            color=ORANGE,
-            lw=2.6,
-            ls=(0, (1.6, 0.8)),
-            marker="s",
-            ms=7.5,
-            mec=INK,
-            markevery=(1, 3),
+            "prismatic joint", color=ORANGE, lw=2.6, ls=(0, (1.6, 0.8)), marker="s", ms=7.5, mec=INK, markevery=(1, 3)
         )
         self._revolute = self._line("revolute joint", ls="", marker="o", ms=6, mfc="white", mec=INK, mew=1.3)
         self._tool = self._line("tool", ls="", marker="D", ms=5.5, mfc=VERMILION, mec=INK, mew=0.8)
@@ -158,25 +143,17 @@ class Scene:
                 line.set_data_3d(np.vstack([path[-1], path[-1] + self._frame_length * axis]).T)
 
     def set_solids(self, q: FloatArray, boxes: FloatArray | None) -> None:
-        """Moves bodies and obstacles, if they are shown.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]. Shape (n,).
-            boxes: The obstacles; None for those at the start. Shape (o, 16).
-        """
+        """Moves bodies and obstacles, if they are shown; boxes are None for those at the start."""
         if self._solids is not None:
             self._clearance = self._solids.show(q, boxes)
 
     def set_errors(self, time: FloatArray, errors: FloatArray, steps: int) -> bool:
-        """Moves the error curves on, and the time and the clearance in the heading.
+        """Moves the error curves on, and the heading; returns whether an axis changed, so that all is drawn anew.
 
         Args:
             time: The times so far in [s]. Shape (k,).
             errors: Errors of position in [m] and of orientation in [rad]. Shape (k, 2).
             steps: Steps of the episode.
-
-        Returns:
-            Whether an axis changed, so that all must be drawn anew.
         """
         clearance = f",  clearance {1e3 * self._clearance:.1f} mm" if math.isfinite(self._clearance) else ""
         self._heading.set_text(f"{self._title},  t = {time[-1]:.3f} s{clearance}")
@@ -184,11 +161,7 @@ class Scene:
         return any(changes)
 
     def paint(self, *, anew: bool) -> None:
-        """Brings the picture up to date.
-
-        Args:
-            anew: Whether a fixed part has changed.
-        """
+        """Brings the picture up to date; all of it if a fixed part has changed."""
         canvas: Any = self.figure.canvas
         if anew or self._background is None:
             canvas.draw()
@@ -234,9 +207,7 @@ class Scene:
         pitch = (top - bottom + gap) / len(kinds)
         return [
             ErrorCurve(
-                self.figure.add_axes((0.66, top + gap - i * pitch, 0.315, pitch - gap)),
-                *kind,
-                last=i == len(kinds),
+                self.figure.add_axes((0.66, top + gap - i * pitch, 0.315, pitch - gap)), *kind, last=i == len(kinds)
             )
             for i, kind in enumerate(kinds, start=1)
         ]

@@ -15,13 +15,7 @@ from ikgym.validation import FloatArray
 
 
 class SolidLines:
-    """The lines of bodies, obstacles and the closest pair.
-
-    Args:
-        arm: The arm that moves.
-        surroundings: The obstacles as they are at the start.
-        line: Makes a line in space, from its name and its style.
-    """
+    """The lines of bodies, obstacles and the closest pair; `line` makes one in space, from its name and its style."""
 
     def __init__(self, arm: Arm, surroundings: Surroundings, line: Callable[..., Any]) -> None:
         self._arm, self._surroundings = arm, surroundings
@@ -34,11 +28,7 @@ class SolidLines:
         self.lines = [one for one in (self._obstacles, self._bodies, self._pair) if one is not None]
 
     def extent(self, boxes: FloatArray | None) -> FloatArray:
-        """Points of obstacles that the picture has to show in [m], within reach. Shape (k, 3).
-
-        Args:
-            boxes: The obstacles; None for those at the start. Shape (o, 16).
-        """
+        """Points of obstacles that the picture has to show in [m], within reach. Shape (k, 3)."""
         boxes = self._surroundings.boxes if boxes is None else boxes
         points = _outlines(boxes[boxes[:, 12] >= 0.0])
         return np.clip(points[np.isfinite(points[:, 0])], -self._view[1], self._view[1])
@@ -48,15 +38,7 @@ class SolidLines:
         self._view = 0.5 * (low + high), 0.5 * float((high - low).max())
 
     def show(self, q: FloatArray, boxes: FloatArray | None) -> float:
-        """Moves the lines.
-
-        Args:
-            q: Joint coordinates in [rad] or [m]. Shape (n,).
-            boxes: The obstacles; None for those at the start. Shape (o, 16).
-
-        Returns:
-            The distance of the closest pair in [m], infinite where there is none.
-        """
+        """Moves the lines; returns the distance of the closest pair in [m], infinite where there is none."""
         boxes = self._surroundings.boxes if boxes is None else boxes
         found = closest(self._arm, q[None], boxes[None], self._surroundings.checked)
         if self._obstacles is not None:

@@ -8,12 +8,7 @@ from ikgym.rl import vector
 from ikgym.rl.ids import IDS
 from ikgym.rl.making import Task, make, make_vec
 from ikgym.rl.scoring import Score, costs, score
-from ikgym.rl.wrappers import (
-    DistanceReward,
-    History,
-    ShareAction,
-    TrackObservation,
-)
+from ikgym.rl.wrappers import DistanceReward, History, ShareAction, TrackObservation
 
 __all__ = [
     "IDS",

@@ -65,13 +65,7 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
 
 
 def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
-    """The infos of each step of whole episodes, also beyond where training would end them.
-
-    Args:
-        model: Any object with the `predict` of Stable-Baselines3.
-        task: What it sees.
-        seeds: Of the episodes.
-    """
+    """The infos of each step of whole episodes, also beyond where training would end them; see :func:`costs`."""
     envs = task.replace(lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
     observation, _ = envs.reset(seed=list(seeds))
     state, begun = None, np.ones(len(seeds), dtype=np.bool_)
@@ -100,21 +94,13 @@ def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str
 
 
 def environment(name: str) -> type[TaskEnv]:
-    """The class of an id.
-
-    Raises:
-        UnknownNameError: There is no such environment.
-    """
+    """The class of an id."""
     known_name("environment", name, IDS)
     return IDS[name]
 
 
 def yardsticks(split: str) -> dict[str, dict[str, float]]:
-    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`.
-
-    Raises:
-        UnknownNameError: They are not known for that split.
-    """
+    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`."""
     known_name("split", split, [one for one in _yardsticks() if one in scenarios.SPLITS])
     found: dict[str, dict[str, float]] = _yardsticks()[split]
     return found

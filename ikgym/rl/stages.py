@@ -29,12 +29,7 @@ class Stage:
     action_space: spaces.Box | None = None
 
     def observation(self, observation: Any, begun: BoolArray) -> Any:
-        """The observation of N rows.
-
-        Args:
-            observation: From the environment, with a leading axis of N.
-            begun: Rows whose observation is the first of an episode. Shape (N,).
-        """
+        """The observation of N rows, from that of the environment and the rows whose episodes have begun, (N,)."""
         del begun
         return observation
 
@@ -43,12 +38,7 @@ class Stage:
         return self.observation(observation, begun)
 
     def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
-        """The last observations of rows whose next episodes have begun in the same step.
-
-        Args:
-            rows: Which ones. Shape (k,).
-            observations: From the environment, without a row axis.
-        """
+        """The last observations of k rows whose next episodes have begun in the same step."""
         del rows
         return observations
 
@@ -57,12 +47,7 @@ class Stage:
         return actions
 
     def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
-        """The rewards of N rows.
-
-        Args:
-            rewards: From the environment. Shape (N,).
-            told: Costs and errors of the same step.
-        """
+        """The rewards of N rows, from those of the environment, and costs and errors of the same step."""
         del told
         return rewards
 
@@ -105,11 +90,7 @@ def one_row(observation: Any) -> Any:
 
 
 def checked_actions(actions: npt.ArrayLike, space: Any) -> FloatArray:
-    """Actions clipped to their box, as float64.
-
-    Raises:
-        InvalidInputError: They have a wrong shape or type.
-    """
+    """Actions clipped to their box, as float64."""
     raw = np.asarray(actions)
     if raw.dtype.kind not in "fiub" or raw.shape != space.shape:
         raise InvalidInputError(f"action: expected numbers of shape {space.shape}, got {shortened(actions)}.")

@@ -103,11 +103,7 @@ class DistanceStage(Stage):
 
 
 def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
-    """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once.
-
-    Raises:
-        InvalidInputError: They do not rise from above 0, or there is none.
-    """
+    """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once."""
     times = float_array("ahead", ahead)
     if times.ndim != 1 or not times.size or (np.diff(times, prepend=0.0) <= 0.0).any():
         raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shortened(ahead)}.")
@@ -128,11 +124,7 @@ def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
 
 
 def own_space(env: Any) -> spaces.Dict:
-    """The observation space of one row of an environment of this package.
-
-    Raises:
-        InvalidInputError: The environment is another, or its observation has been changed.
-    """
+    """The observation space of one row of an environment of this package."""
     if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
         raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
     name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"

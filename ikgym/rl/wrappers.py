@@ -15,13 +15,7 @@ FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
 
 
 class ArmWrapper(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """A :class:`ikgym.rl.stages.Stage` around one arm, which is one row.
-
-    Args:
-        env: The environment.
-        stage: The work of the wrapper.
-        parameters: The parameters of the stage, recorded in the environment's `spec`.
-    """
+    """A :class:`ikgym.rl.stages.Stage` around one arm, which is one row; `spec` records its parameters."""
 
     def __init__(self, env: gym.Env[Any, Any], stage: Stage, **parameters: Any) -> None:
         RecordConstructorArgs.__init__(self, **parameters)

@@ -45,11 +45,7 @@ __all__ = [
 
 #: Reset seeds of the random scenarios, by purpose. Scores are published on the test seeds, counted from their first;
 #: nothing may be trained or tuned on them, nor on those for validation.
-SPLITS = {
-    "train": range(0, 1_000_000),
-    "validation": range(1_000_000, 2_000_000),
-    "test": range(2_000_000, 3_000_000),
-}
+SPLITS = {"train": range(0, 1_000_000), "validation": range(1_000_000, 2_000_000), "test": range(2_000_000, 3_000_000)}
 #: The files of the catalogue: of the papers, paths for several arms, imperfect plants, arms that can touch something,
 #: problems of others, and those of the environments for learning.
 FILES = {

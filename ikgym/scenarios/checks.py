@@ -29,11 +29,7 @@ MOST_OBSTACLES = 1000
 
 
 def check_parts(fields: Mapping[str, Any]) -> None:
-    """Checks the classes of a scenario's parts, and that model and task suit arm and trajectory.
-
-    Raises:
-        InvalidInputError: One is something else, or does not fit.
-    """
+    """Checks the classes of a scenario's parts, and that model and task suit arm and trajectory."""
     name, arm, model, task = (fields[key] for key in ("name", "arm", "model", "task"))
     for field in ("name", "source"):
         if not isinstance(fields[field], str):
@@ -50,17 +46,7 @@ def check_parts(fields: Mapping[str, Any]) -> None:
 
 
 def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """The obstacles of a scenario.
-
-    Args:
-        fields: The fields of the scenario; its other parts are checked already.
-
-    Raises:
-        InvalidInputError: They are no sequence of obstacles with different names, there are too many, the arm has no
-            bodies where touching matters, one is drawn beside a path that is no random joint motion, or the cost of
-            proximity is none or without collisions.
-        UnknownNameError: One ignores a body that there is not.
-    """
+    """The obstacles of a scenario, whose other parts are checked already."""
     name, arm, given, collisions = (fields[key] for key in ("name", "arm", "obstacles", "collisions"))
     if not isinstance(given, (tuple, list)) or not all(isinstance(one, Obstacle) for one in given):
         raise InvalidInputError(
@@ -100,16 +86,7 @@ def _check_proximity(name: str, cost: Any, matters: bool) -> None:
 
 
 def step_count(name: str, value: int, joints: int) -> int:
-    """A number of steps.
-
-    Args:
-        name: Name of the field in messages.
-        value: The number.
-        joints: Of the arm, for the memory that the message states.
-
-    Raises:
-        InvalidInputError: It is no whole number from 1 to :data:`MOST_STEPS`.
-    """
+    """A number of steps; the message states the memory for so many joints."""
     steps = whole_number(name, value, at_least=1)
     if steps > MOST_STEPS:
         raise InvalidInputError(
@@ -126,23 +103,12 @@ def bytes_of(points: int, joints: int) -> int:
 
 
 def check_memory_of_points(points: int, joints: int) -> None:
-    """Checks that there is memory for the nominal points of an episode.
-
-    Raises:
-        InvalidInputError: There is not; the message says how much it takes and how much is available.
-    """
+    """Checks that there is memory for the nominal points of an episode."""
     check_memory(f"The {points} nominal points of an episode", bytes_of(points, joints))
 
 
 def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray, distance: float) -> float:
-    """The most that one step can cost.
-
-    Args:
-        task: The task coordinates.
-        cost: The stage cost.
-        velocity_limit: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
-        distance: Largest position error in [m].
-    """
+    """The most that one step can cost at the largest joint velocities and a position error in [m]."""
     # Parts of two rotations differ by 2 at most; a rotation vector is no longer than π.
     turned = np.pi if task.kind in (task_kernels.POSE, task_kernels.AXIS) else 2.0
     errors = np.array([distance] * 3 + [turned] * (task.error_size - 3))
@@ -150,16 +116,7 @@ def largest_step_cost(task: Task, cost: TrackingCost, velocity_limit: FloatArray
 
 
 def check_cost(name: str, step_cost: float, steps: int) -> None:
-    """Checks that the cost of an episode stays finite.
-
-    Args:
-        name: The scenario's.
-        step_cost: The most that one step can cost.
-        steps: Of an episode.
-
-    Raises:
-        InvalidInputError: It may exceed :data:`LARGEST_COST`.
-    """
+    """Checks that the cost of an episode stays finite, by the most that one step can cost."""
     if not steps * step_cost <= LARGEST_COST:  # nor is it NaN
         raise InvalidInputError(
             f"Scenario {name!r}: expected a cost of at most {LARGEST_COST:g} for the worst episode, got "

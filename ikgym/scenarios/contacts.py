@@ -19,13 +19,7 @@ from ikgym.validation import BoolArray, FloatArray
 
 
 def plant_rows(scenario: Scenario, rows: int, commands: int) -> PlantRows:
-    """The plants of N arms, with bodies and obstacles where they can touch.
-
-    Args:
-        scenario: The scenario.
-        rows: N.
-        commands: h, the number of past commands shown.
-    """
+    """The plants of N arms that show h past commands, with bodies and obstacles where they can touch."""
     contacts = contacts_of(scenario, rows) if scenario.collides else None
     return PlantRows(scenario.plant, scenario.arm, scenario.dt, rows, scenario.task.size, commands, contacts)
 
@@ -45,18 +39,7 @@ def draw_obstacles(
     episodes: Sequence[Trajectory],
     generators: Sequence[np.random.Generator],
 ) -> None:
-    """Draws the obstacles of some rows' episodes.
-
-    Args:
-        scenario: The scenario.
-        contacts: Receives the obstacles.
-        rows: The numbers of the rows. Shape (k,).
-        episodes: Their trajectories.
-        generators: One an episode, see :meth:`ikgym.Scenario.drawn_obstacles`.
-
-    Raises:
-        InvalidInputError: There is no room for an obstacle in an episode.
-    """
+    """Draws the obstacles of the episodes of some rows, see :meth:`ikgym.Scenario.drawn_obstacles`."""
     drawn = np.repeat([one.random for one in scenario.obstacles], [one.count for one in scenario.obstacles])
     numbers = scenario.drawn_obstacles(episodes, generators)
     for row, own in zip(rows.tolist(), numbers, strict=True):
@@ -70,17 +53,7 @@ def pair_names(scenario: Scenario, pair: Sequence[int]) -> tuple[str, str]:
 
 
 def check_clear(scenario: Scenario, out: Outcome, active: BoolArray, q: FloatArray) -> None:
-    """Checks that arms touch nothing at the start of their episodes.
-
-    Args:
-        scenario: The scenario.
-        out: What is observed.
-        active: Which arms are. Shape (N,).
-        q: Their joint coordinates in [rad] or [m]. Shape (N, n).
-
-    Raises:
-        InvalidInputError: One does; the message names the pair, and how to let it touch.
-    """
+    """Checks that arms touch nothing at the start of their episodes; shapes (N,) and (N, n)."""
     touching = np.flatnonzero(active & (out.clearance <= 0.0) & (out.stopped == 0.0))
     if len(touching):
         row = int(touching[0])

@@ -20,10 +20,7 @@ def duration(trajectory: Trajectory) -> float | None:
 def default_steps(trajectory: Trajectory, dt: float, held: tuple[int, ...]) -> int:
     """Steps for a whole path and a short rest, at least one step; :data:`USUAL_STEPS` where there is no end.
 
-    Args:
-        trajectory: The trajectory.
-        dt: Δt in [s].
-        held: Steps for which the nominal points 1, 2, … are held, the last number for all later ones.
+    Nominal points 1, 2, … are held for so many steps, the last number for all later ones.
     """
     time = duration(trajectory)
     if time is None:

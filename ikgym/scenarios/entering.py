@@ -18,19 +18,7 @@ Steps = npt.NDArray[np.int64]
 
 
 def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> FloatArray | None:
-    """Starts chosen by the user.
-
-    Args:
-        q: Joint coordinates in [rad] or [m], of shape (n,) for all rows, or (N, n). None for the scenario's own.
-        rows: N.
-        scenario: The tracking problem.
-
-    Returns:
-        One start a row, of shape (N, n), or None.
-
-    Raises:
-        InvalidInputError: A start has a wrong shape, is not finite, out of range or outside the arm's limits.
-    """
+    """Starts chosen by the user in [rad] or [m]: one for all rows or one a row, as shape (N, n); None for none."""
     if q is None:
         return None
     joints, bound = scenario.joints, scenario.start_bound()
@@ -47,19 +35,7 @@ def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> Fl
 
 
 def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
-    """Steps at which episodes are entered, chosen by the user.
-
-    Args:
-        given: A whole number for all rows, or one a row, where None stands for the beginning.
-        rows: N.
-        scenario: The tracking problem.
-
-    Returns:
-        One a row, of shape (N,), or None.
-
-    Raises:
-        InvalidInputError: They are no such numbers, not one a row, or there is no joint path to enter on.
-    """
+    """Steps at which episodes are entered: one for all rows or one a row, as shape (N,); None for none."""
     if given is None:
         return None
     checked = [step or 0 for step in one_a_row("options['step']", given, rows)]
@@ -81,7 +57,7 @@ def first_states(
     """The arms' first states in episodes: at rest at the start, or on the reference joint path after some steps.
 
     Args:
-        scenario: The tracking problem.
+        scenario: The scenario.
         points: Its points, of `Scenario.points`.
         episodes: Trajectories of the k episodes.
         steps: Steps after which they are entered, or 0. Shape (k,).
@@ -90,9 +66,6 @@ def first_states(
     Returns:
         Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
         applied. Shapes (k, n).
-
-    Raises:
-        InvalidInputError: The arm cannot be there; the message names the joint.
     """
     entered, shape = steps > 0, (len(steps), scenario.joints)
     q, qdot = np.empty(shape) if entered.all() else scenario.first_q_of(episodes), np.zeros(shape)

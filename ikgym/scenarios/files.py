@@ -58,10 +58,6 @@ def arguments(
         folder: Paths of other files are relative to it.
         where: Name of the table in messages.
         like: Whether arguments without a default may be missing.
-
-    Raises:
-        InvalidInputError: A key is missing, or a value is of a wrong type.
-        UnknownNameError: There is no such key, arm, task or kind; the message has the nearest one.
     """
     parameters, hints = inspect.signature(make).parameters, typing.get_type_hints(make)
     with located(where):
@@ -176,16 +172,7 @@ def located(where: str, file: object = None) -> Iterator[None]:
 
 
 def save(fields: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
-    """Writes a scenario to a file, in one go.
-
-    Args:
-        fields: The fields of the scenario.
-        file: A name that ends in ``.toml``.
-
-    Raises:
-        InvalidInputError: A part of the scenario has no form in a file, or the file cannot be written. An existing file
-            is unchanged then.
-    """
+    """Writes the fields of a scenario to a file, in one go."""
     try:
         path = pathlib.Path(file)
     except TypeError:

@@ -31,8 +31,5 @@ def field(knowledge: float = SEVERITY, drives: float | None = None) -> scenarios
     Args:
         knowledge: Severity of calibration error, payload and camera, see :meth:`ikgym.Plant.scaled`; 0 is ideal.
         drives: Severity of lag and delay; that of the knowledge by default.
-
-    Raises:
-        InvalidInputError: A severity is below 0.
     """
     return scenarios.get(FIELD_NAME).replace(plant=FIELD.scaled(knowledge, drives))

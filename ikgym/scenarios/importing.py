@@ -2,60 +2,33 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-import os
-import sys
-from collections.abc import Iterator
 
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.scenarios.scenario import Scenario
 
 
 def imported(import_path: str) -> Scenario:
-    """The scenario with an import path.
-
-    Args:
-        import_path: ``"package.module:attribute"``. The attribute is a scenario, or is called without arguments to make
-            one. Modules in the current folder are found, too.
-
-    Raises:
-        InvalidInputError: The path has another form, the module cannot be imported, or it leads to no scenario.
-        UnknownNameError: The module has no such attribute; the message has the nearest one.
-    """
+    """The scenario with an import path, whose attribute is one, or is called without arguments to make one."""
     name, _, attribute = import_path.partition(":")
     if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):
         raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {import_path!r}.")
-    with _current_folder():
+    try:
+        module = importlib.import_module(name)
+    except Exception as error:  # whatever the code of others raises
+        raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {_told(error)}") from error
+    if not hasattr(module, attribute):
+        public = [key for key in vars(module) if not key.startswith("_")]
+        raise UnknownNameError(f"attribute of {name}", attribute, public)
+    found = getattr(module, attribute)
+    if callable(found):
         try:
-            module = importlib.import_module(name)
-        except Exception as error:  # whatever the code of others raises
-            raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {_told(error)}") from error
-        if not hasattr(module, attribute):
-            public = [key for key in vars(module) if not key.startswith("_")]
-            raise UnknownNameError(f"attribute of {name}", attribute, public)
-        found = getattr(module, attribute)
-        if callable(found):
-            try:
-                found = found()
-            except Exception as error:
-                raise InvalidInputError(f"Scenario {import_path!r}: making it failed: {_told(error)}") from error
+            found = found()
+        except Exception as error:
+            raise InvalidInputError(f"Scenario {import_path!r}: making it failed: {_told(error)}") from error
     if not isinstance(found, Scenario):
         raise InvalidInputError(f"Scenario {import_path!r}: expected a Scenario or what makes one, got {found!r}.")
     return found
-
-
-@contextlib.contextmanager
-def _current_folder() -> Iterator[None]:
-    """Searches the current folder last, as a console command does not by itself."""
-    folder = os.getcwd()  # noqa: PTH109  # entries of the path are texts
-    importlib.invalidate_caches()  # a file may have been written just now
-    sys.path.append(folder)
-    try:
-        yield
-    finally:
-        if folder in sys.path:
-            del sys.path[len(sys.path) - 1 - sys.path[::-1].index(folder)]
 
 
 def _told(error: Exception) -> str:

@@ -23,9 +23,6 @@ def offsets(preview: Preview) -> tuple[int, ...]:
 
     Args:
         preview: An int p for 1 … p, or a sequence of steps ahead.
-
-    Raises:
-        InvalidInputError: It is neither, or not rising, or below 1.
     """
     if isinstance(preview, (tuple, list)) and preview:
         ahead = tuple(preview)
@@ -41,11 +38,7 @@ def offsets(preview: Preview) -> tuple[int, ...]:
 
 
 def furthest(preview: Preview) -> int:
-    """Number of steps that a preview looks ahead.
-
-    Raises:
-        InvalidInputError: It is no whole number of at least 0, nor a sequence of them.
-    """
+    """Number of steps that a preview looks ahead."""
     steps: list[Any] = list(preview) if isinstance(preview, (tuple, list)) else [preview]
     return max((whole_number("preview", step, at_least=0) for step in steps), default=0)
 

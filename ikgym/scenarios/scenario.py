@@ -23,7 +23,7 @@ from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.surroundings import Surrounded
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, frozen_array, number
+from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, positive
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
@@ -87,9 +87,9 @@ class Scenario(Frozen, Surrounded):
         n = self.arm.joints
         self._settle(model=self.arm if self.model is None else self.model)
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
-        self._settle(dt=number("dt", self.dt, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "dt")
         if self.start is not None:
-            self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))
+            self._settle_by(frozen_array, "start", shape=(n,), at_most=LARGEST)
         elif self.random and not self.starts_nominally:
             raise InvalidInputError(f"Scenario {self.name!r}: a random Cartesian trajectory needs a start.")
         if self.initial_pose is not None:

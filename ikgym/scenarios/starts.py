@@ -15,19 +15,9 @@ MILLIMETRES = 50.0
 
 
 def found(name: str, arm: Arm, frame: FloatArray) -> FloatArray:
-    """Joint coordinates within the limits of an arm at a pose, near to its home posture if there are some.
+    """Joint coordinates within the limits of an arm at a pose, near to its home posture if there are some. Shape (n,).
 
-    Args:
-        name: Of the scenario.
-        arm: The arm that moves.
-        frame: The 9 numbers of the rotation, row by row, and the 3 of the position in [m]; the position alone where
-            there is no orientation. Shape (12,) or (3,).
-
-    Returns:
-        Joint coordinates in [rad] or [m], read-only. Shape (n,).
-
-    Raises:
-        InvalidInputError: None were found; the message says how far the nearest are from the pose.
+    The frame has the 9 numbers of the rotation and the 3 of the position in [m], or the position alone.
     """
     rotation, position = (frame[:9].reshape(3, 3) if len(frame) == 12 else None), frame[-3:]
     q, converged = arm.inverse(rotation, position)

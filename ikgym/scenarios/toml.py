@@ -10,14 +10,10 @@ import numpy as np
 
 
 def document(values: Mapping[str, Any]) -> str:
-    """The text of a TOML file.
+    """The text of a TOML file, in which every number reads as the very same number.
 
-    Args:
-        values: Texts, truth values, numbers, arrays, sequences of them, and mappings, which become tables, also nested.
-            Keys consist of letters, digits and ``_``. None is left out.
-
-    Returns:
-        The text; every number reads as the very same number.
+    Values are texts, truth values, numbers, arrays, sequences of them, and mappings, which become tables; None is left
+    out. Keys consist of letters, digits and ``_``.
     """
     return "\n".join(_lines(values, "")) + "\n"
 

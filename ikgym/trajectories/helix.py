@@ -37,10 +37,9 @@ class Helix(Trajectory):
     has_orientation: typing.ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        self._settle(center=frozen_array("center", self.center, (3,), at_most=LARGEST))
+        self._settle_by(frozen_array, "center", shape=(3,), at_most=LARGEST)
         self._settle(radius=number("radius", self.radius, above=0.0, at_most=LARGEST))
-        for name in ("frequency", "climb", "start"):
-            self._settle(**{name: signed(name, getattr(self, name))})
+        self._settle_by(signed, "frequency", "climb", "start")
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""

@@ -10,7 +10,7 @@ import numpy as np
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.batch import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number
+from ikgym.validation import LARGEST, FloatArray, frozen_array, positive
 
 # Relative slack of bounds, for rounding.
 SLACK = 1e-12
@@ -43,7 +43,7 @@ class JointSpline(Trajectory):
         if ends.any():
             raise InvalidInputError("control: expected the first three to be the same and the last three, for rest.")
         self._settle(control=control)
-        self._settle(duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "duration")
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""

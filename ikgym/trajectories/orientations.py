@@ -24,11 +24,7 @@ class Orientation(Frozen, abc.ABC):
     """The orientation of a tool as a function of the arc length of its path."""
 
     def check(self, path: Path) -> None:
-        """Checks that the law suits a path.
-
-        Raises:
-            InvalidInputError: It does not.
-        """
+        """Checks that the law suits a path."""
         del path
 
     @abc.abstractmethod
@@ -58,7 +54,7 @@ class FixedOrientation(Orientation):
     rotation: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
+        self._settle_by(rotation_matrix, "rotation")
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`."""
@@ -85,7 +81,7 @@ class AlongPath(Orientation):
         if not approach.any():
             raise InvalidInputError("approach: expected a direction, got the zero vector.")
         self._settle(approach=approach)
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
+        self._settle_by(rotation_matrix, "rotation")
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path may nowhere lead in the direction of the approach."""
@@ -127,8 +123,8 @@ class Turning(Orientation):
     vector: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(rotation=rotation_matrix("rotation", self.rotation))
-        self._settle(vector=frozen_array("vector", self.vector, (3,), at_most=LARGEST))
+        self._settle_by(rotation_matrix, "rotation")
+        self._settle_by(frozen_array, "vector", shape=(3,), at_most=LARGEST)
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`, with Rodrigues' formula."""
@@ -155,7 +151,7 @@ class OrientationThrough(Orientation):
     quaternions: FloatArray
 
     def __post_init__(self) -> None:
-        self._settle(quaternions=aligned_quaternions("quaternions", self.quaternions))
+        self._settle_by(aligned_quaternions, "quaternions")
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path has as many waypoints."""
@@ -170,11 +166,7 @@ class OrientationThrough(Orientation):
 
 
 def aligned_quaternions(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4).
-
-    Raises:
-        InvalidInputError: See :class:`OrientationThrough`.
-    """
+    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4)."""
     given = float_array(name, value, (None, 4), at_most=LARGEST)
     lengths = np.linalg.norm(given, axis=1)
     if (np.abs(lengths - 1.0) > QUATERNION_TOLERANCE).any():

@@ -13,7 +13,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError, listed
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, shortened
+from ikgym.validation import FloatArray, positive, shortened
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class PublishedPath(Trajectory):
 
     def __post_init__(self) -> None:
         problems.waypoints(self.problem)
-        self._settle(period=number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "period")
 
     @property
     def waypoints(self) -> problems.Waypoints:
@@ -91,7 +91,7 @@ class RandomPublishedPath(Trajectory):
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
                 f"available: {listed(problems.names())}."
             )
-        self._settle(period=number("period", self.period, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "period")
 
     def sample(self, rng: np.random.Generator) -> PublishedPath:
         """See :meth:`Trajectory.sample`."""

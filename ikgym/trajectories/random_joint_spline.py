@@ -16,7 +16,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.motions import control_rows
 from ikgym.trajectories.joint_spline import JointSpline, JointSplines
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, whole_number
+from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, positive, whole_number
 
 # Most spans: each draw needs memory for all of them.
 MOST_SPANS = 10_000
@@ -72,7 +72,7 @@ class RandomJointSpline(Trajectory):
             upper=upper,
             velocity_limit=_positive("velocity_limit", self.velocity_limit, n),
             acceleration_limit=_positive("acceleration_limit", self.acceleration_limit, n),
-            duration=number("duration", self.duration, at_least=SMALLEST, at_most=LARGEST),
+            duration=positive("duration", self.duration),
             spans=whole_number("spans", self.spans, at_least=3, at_most=MOST_SPANS),
             margin=number("margin", self.margin, at_least=0.0, at_most=0.99),
             scale=(low, high),

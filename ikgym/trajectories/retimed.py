@@ -43,8 +43,7 @@ class RetimedTrajectory(Trajectory):
             raise InvalidInputError(f"trajectory: expected a Trajectory that is not random, got {self.trajectory!r}.")
         times = frozen_array("times", self.times, (None,), at_most=LARGEST)
         check_count("times", times)
-        for name in ("times", "progress", "rates"):
-            self._settle(**{name: frozen_array(name, getattr(self, name), (len(times),), at_most=LARGEST)})
+        self._settle_by(frozen_array, "times", "progress", "rates", shape=(len(times),), at_most=LARGEST)
         for name, least in {"times": np.diff(times), "progress": np.diff(self.progress), "rates": self.rates}.items():
             if (least < 0.0).any() or (name == "times" and not least.all()):
                 raise InvalidInputError(f"{name}: expected numbers that {_WANTED[name]}, got {least.min():g} as one.")

@@ -39,9 +39,8 @@ class Sinusoid(Trajectory):
     sigmoid: float | None = None
 
     def __post_init__(self) -> None:
-        self._settle(amplitude=frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
-        for name in ("frequency", "phase", "offset"):
-            self._settle(**{name: per_joint(name, getattr(self, name), len(self.amplitude), at_most=LARGEST)})
+        self._settle_by(frozen_array, "amplitude", shape=(None,), at_most=LARGEST)
+        self._settle_by(per_joint, "frequency", "phase", "offset", n=len(self.amplitude), at_most=LARGEST)
         if self.sigmoid is not None:
             self._settle(sigmoid=number("sigmoid", self.sigmoid, above=0.0, at_most=LARGEST))
 
@@ -79,7 +78,7 @@ class RandomSinusoid(Trajectory):
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        self._settle(amplitude=frozen_array("amplitude", self.amplitude, (None,), at_most=LARGEST))
+        self._settle_by(frozen_array, "amplitude", shape=(None,), at_most=LARGEST)
         for name in ("scale", "frequency", "phase"):
             low, high = frozen_array(name, getattr(self, name), (2,), at_most=LARGEST).tolist()
             if low > high:

@@ -10,7 +10,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, rotation_matrix
+from ikgym.validation import LARGEST, FloatArray, frozen_array, positive, rotation_matrix
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,8 +40,7 @@ class StraightLine(Trajectory):
             frame = frozen_array(name, getattr(self, name), (12,), at_most=LARGEST)
             rotation_matrix(f"rotation of {name}", frame[:9].reshape(3, 3))
             self._settle(**{name: frame})
-        for name in ("duration", "blend"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
+        self._settle_by(positive, "duration", "blend")
         if 2.0 * self.blend > self.duration:
             raise InvalidInputError(
                 f"blend: expected at most half of the duration of {self.duration:g} s, got {self.blend:g} s."

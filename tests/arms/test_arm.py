@@ -24,13 +24,6 @@ def parts(**changes):
     } | changes
 
 
-@every_arm
-def test_arrays_are_read_only(arm):
-    for array in (*(getattr(arm, field) for field in ARRAYS), *arm.chain):
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0
-
-
 def test_arrays_are_no_aliases_of_the_input():
     given = {
         "offsets": np.array([[0.0, 0, 1], [1, 0, 0]]),
@@ -56,7 +49,8 @@ def test_copies_are_equal_and_read_only(arm):
     assert (other.name, other.prismatic, other.joint_names) == (arm.name, arm.prismatic, arm.joint_names)
     for field in ARRAYS:
         np.testing.assert_array_equal(getattr(other, field), getattr(arm, field))
-        assert not getattr(other, field).flags.writeable
+    for one in (arm, other):
+        assert not any(array.flags.writeable for array in (*(getattr(one, field) for field in ARRAYS), *one.chain))
     q = np.linspace(-1, 1, arm.joints)
     for one, theirs in zip(arm.forward_and_jacobian(q), other.forward_and_jacobian(q), strict=True):
         np.testing.assert_array_equal(one, theirs)

@@ -138,9 +138,11 @@ def test_the_capsule_around_a_mesh_contains_its_corners_and_is_small():
     assert found.volume < 1.02 * exact
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "dae"])
-@pytest.mark.parametrize("name", ["package://some_robot/meshes/link", "meshes/link"])
-def test_meshes_are_opened_where_they_are_asked_for(tmp_path, kind, name, caplog):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("package://some_robot/meshes/link", "stl"), *(("meshes/link", kind) for kind in ("obj", "ply", "dae"))],
+)
+def test_meshes_are_opened_where_they_are_asked_for(tmp_path, name, kind, caplog):
     folder = tmp_path / "some_robot"
     (folder / "meshes").mkdir(parents=True)
     mesh = trimesh.creation.cone(0.1, 0.5)

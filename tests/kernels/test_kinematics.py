@@ -54,21 +54,14 @@ def test_jacobian_agrees_with_central_differences(arm):
 
 
 @every_arm
-def test_a_batch_equals_its_rows_bit_for_bit(arm):
+def test_a_batch_equals_its_rows_and_all_equals_its_parts_bit_for_bit(arm):
     q = configurations(arm)
     batch = arm.forward_and_jacobian(q)
     for i, row in enumerate(q):
         for whole, single in zip(batch, arm.forward_and_jacobian(row), strict=True):
             np.testing.assert_array_equal(whole[i], single)
-
-
-@every_arm
-def test_forward_and_jacobian_equals_its_parts_bit_for_bit(arm):
-    q = configurations(arm)
-    rotation, position, jacobian = arm.forward_and_jacobian(q)
-    np.testing.assert_array_equal(rotation, arm.forward(q)[0])
-    np.testing.assert_array_equal(position, arm.forward(q)[1])
-    np.testing.assert_array_equal(jacobian, arm.jacobian(q))
+    for part, alone in zip(batch, (*arm.forward(q), arm.jacobian(q)), strict=True):
+        np.testing.assert_array_equal(part, alone)
 
 
 @pytest.mark.parametrize("lead", [(), (1,), (0,), (2, 3), (2, 0)], ids=str)

@@ -82,12 +82,6 @@ def test_history_stands_newest_first():
         rl.History(gym.make("RedundantIK-v0", scenario=short()))
 
 
-def test_gymnasium_accepts_what_is_made():
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*different from the unwrapped version.*")
-        check_env(rl.make(short()), skip_render_check=True)
-
-
 @pytest.mark.parametrize(("dt", "steps"), [(0.01, (1, 5)), (0.001, (10, 50)), (0.02, (1, 2)), (1.0, (1,))])
 def test_the_reference_is_shown_at_times_ahead(dt, steps):
     env = rl.make(ikgym.scenarios.get("panda-random").replace(dt=dt, steps=20))

@@ -30,24 +30,24 @@ def test_a_worst_episode_that_costs_too_much_is_refused(change):
 
 
 @pytest.mark.parametrize("name", every_scenario())
-def test_no_step_costs_more_than_the_bound(name):
-    """From the farthest start, at full speed: the bound is true, and within 12 decades of what happens."""
-    scenario = scenarios.get(name).replace(steps=30, iterations_per_point=1, dt=0.3, obstacles=(), collisions=False)
+def test_bounds_are_true_at_the_worst(name):
+    """From the farthest start, at full speed; that of the cost is within 12 decades of what happens."""
+    changes = {"steps": 30, "iterations_per_point": 1, "dt": 0.3, "plant": ikgym.Plant(bias=0.5, noise=0.5)}
+    scenario = scenarios.get(name).replace(**changes, obstacles=(), collisions=False)
     bound, env, worst = scenario.largest_step_cost(), ikgym.RedundantIKEnv(scenario), 0.0
     for sign in (-1.0, 1.0):
         start = np.clip(sign * scenario.start_bound(), scenario.arm.lower, scenario.arm.upper)
-        env.reset(seed=0, options={"q": start})
+        assert env.observation_space.contains(env.reset(seed=0, options={"q": start})[0])
         for _ in range(scenario.steps):
-            worst = max(worst, -env.step(np.full(scenario.joints, sign))[1])
+            observation, reward, *_ = env.step(np.full(scenario.joints, 2.0 * sign))
+            assert env.observation_space.contains(observation)
+            worst = max(worst, -reward)
     assert 0.0 < worst <= bound < 1e12 * worst
 
 
 def test_at_the_bounds_all_is_finite():
     scenario = FAST.replace(
-        cost=ikgym.TrackingCost(delta_x=1e-12),
-        dt=1e12,
-        velocity_limit=1e12,
-        trajectory=Sinusoid([1e12] * 7, 1e12),
+        cost=ikgym.TrackingCost(delta_x=1e-12), dt=1e12, velocity_limit=1e12, trajectory=Sinusoid([1e12] * 7, 1e12)
     )
     env = ikgym.RedundantIKEnv(scenario.replace(steps=3))
     env.reset(seed=0)
@@ -57,7 +57,7 @@ def test_at_the_bounds_all_is_finite():
         assert env.observation_space.contains(observation)
 
 
-@pytest.mark.parametrize("steps", [10**12, 10**9, 10**400])
+@pytest.mark.parametrize("steps", [10**9, 10**400])
 @pytest.mark.parametrize("field", ["steps", "iterations_per_point"])
 def test_more_steps_than_any_memory_holds(field, steps):
     message = (
@@ -87,7 +87,7 @@ def test_many_steps_need_memory():
     lambda n: ikgym.RedundantIKVectorEnv(n),
     lambda n: __import__("ikgym.sb3").sb3.RedundantIKVecEnv(n, "varga7-random"),
 ])  # fmt: skip
-@pytest.mark.parametrize("number", [10**6, 10**13, 10**400])
+@pytest.mark.parametrize("number", [10**6, 10**400])
 @pytest.mark.usefixtures("little")
 def test_many_environments_need_memory(make, number):
     with pytest.raises(

@@ -14,7 +14,6 @@ ARMS = ("panda", "iiwa14", "tiago")
 FAMILIES = ("circle", "lemniscate", "square", "raster", "line", "turn", "singular", "edge", "fast", "glue")
 #: The control points that are singular postures: a stretched elbow, an aligned wrist. Two more stand before the first.
 STRETCHED, ALIGNED = 2 + 5, 2 + 5 + 20
-FEASIBLE = ("circle", "lemniscate", "square", "raster", "line", "glue")
 each_arm = pytest.mark.parametrize("arm", ARMS)
 
 
@@ -34,9 +33,9 @@ def test_every_arm_has_every_path(arm):
 @pytest.mark.parametrize(
     ("name", "policy"),
     [
-        *((f"panda-{path}", "dls") for path in FEASIBLE),
+        *((f"panda-{path}", "dls") for path in ("circle", "square", "line")),
         *((f"iiwa14-{path}", "dls") for path in ("lemniscate", "glue")),
-        *((f"tiago-{path}", "qp") for path in FEASIBLE),  # damped least squares asks too much of its torso
+        *((f"tiago-{path}", "qp") for path in ("raster", "glue")),  # damped least squares asks too much of its torso
     ],
 )
 def test_feasible_paths_are_followed_within_all_limits(name, policy):

@@ -8,6 +8,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.cli import main
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError
 from ikgym.sb3 import RedundantIKVecEnv
@@ -37,17 +38,10 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "my_faulty.py").write_text("import no_such_module")
     (tmp_path / "my_package").mkdir()
     (tmp_path / "my_package" / "arms.py").write_text(MODULE)
-    # As in a console command, where Python does not search the current folder by itself.
-    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(tmp_path))])
+    monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
     for name in ("my_scenarios", "my_faulty", "my_package", "my_package.arms"):
         sys.modules.pop(name, None)
-
-
-@pytest.fixture
-def registry(monkeypatch):
-    monkeypatch.setattr(scenarios._registry, "_makers", dict(scenarios._registry._makers))
-    monkeypatch.setattr(scenarios._registry, "_made", dict(scenarios._registry._made))
 
 
 ITEMS = [
@@ -62,13 +56,17 @@ ITEMS = [
 
 @pytest.mark.parametrize("item", ITEMS, ids=str)
 def test_find(folder, item):
-    before = list(sys.path)
     found = scenarios.find(item)
     assert (found.name, found.steps, found.arm.name) == ("short", 3, "varga7")
-    assert sys.path == before
 
 
-def test_registered_names_take_precedence(folder, registry):
+def test_the_command_line_searches_the_current_folder(folder, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(folder))])
+    assert main(["evaluate", "--scenarios", "my_scenarios:SHORT", "--policies", "dls"]) == 0
+    assert "short" in capsys.readouterr().out
+
+
+def test_registered_names_take_precedence(folder, own_registries):
     scenarios.register("short.toml", lambda: FAST)
     scenarios.register("my_scenarios:SHORT", lambda: FAST)
     assert scenarios.find("short.toml") is scenarios.find("my_scenarios:SHORT") is FAST

@@ -6,7 +6,6 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 import ikgym
 from baselines.fingerprints import fingerprint
@@ -19,17 +18,11 @@ WHOLE, ON_URDF, PLANT, FROM_CSV = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTA
 _, SNIPPET, _ = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
-@pytest.fixture
-def registry(monkeypatch):
-    monkeypatch.setattr(ikgym.scenarios._registry, "_makers", dict(ikgym.scenarios._registry._makers))
-    monkeypatch.setattr(ikgym.scenarios._registry, "_made", dict(ikgym.scenarios._registry._made))
-
-
 def test_the_example_is_the_file_of_the_examples():
     assert tomllib.loads(WHOLE) == tomllib.loads((ROOT / "examples" / "planar4.toml").read_text(encoding="utf-8"))
 
 
-def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, registry):
+def test_the_file_and_the_lines_of_python_give_the_same(tmp_path, monkeypatch, own_registries):
     monkeypatch.chdir(tmp_path)
     Path("page.toml").write_text(WHOLE, encoding="utf-8")
     assert len([line for line in SNIPPET.splitlines() if line and not line.startswith("import")]) <= 10

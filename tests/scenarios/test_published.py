@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 import ikgym
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.trajectories import PublishedPath
 from tests.comparison import identical
 
 NAMES = scenarios.names("published")
@@ -80,11 +79,3 @@ def test_what_is_out_of_reach():
         rotations = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
         converged = scenario.arm.inverse(rotations, positions, restarts=300)[1]
         assert np.flatnonzero(~converged).tolist() == list(missed)
-
-
-def test_reach_bounds_all_random_paths():
-    bound = RANDOM.trajectory.reach(np.zeros(1), RANDOM.model)
-    times = np.arange(0.0, 200.0, 0.01)
-    drawn = (PublishedPath(name, PERIOD) for name in problems.names("rlitg-random-")[::9])
-    farthest = max(np.linalg.norm(one.frames(times, RANDOM.model)[:, 9:], axis=1).max() for one in drawn)
-    assert 0.8 * bound < farthest <= bound

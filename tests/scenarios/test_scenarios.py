@@ -2,7 +2,6 @@
 
 import itertools
 import pickle
-import threading
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ import pytest
 import ikgym
 from ikgym import parallel, scenarios
 from ikgym.exceptions import IkgymError, UnknownNameError
-from ikgym.kernels import compilation
 from ikgym.plant import Plant
 from tests.every_scenario import every_scenario
 
@@ -97,16 +95,6 @@ def test_chunks_cover_all_rows_once(monkeypatch):
 
         parallel.in_chunks(work, rows, grain=10)
         assert (seen == 1).all()
-
-
-def test_long_compilation_is_announced(caplog):
-    with compilation.announced("nothing much", patience=0.01):
-        threading.Event().wait(0.2)
-    assert "Compiling nothing much; this happens once, the machine code is kept on disk." in caplog.text
-    caplog.clear()
-    with compilation.announced("nothing much", patience=10.0):
-        pass
-    assert caplog.text == ""
 
 
 def test_replace():

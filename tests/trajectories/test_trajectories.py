@@ -102,7 +102,7 @@ class TestRandom:
             np.testing.assert_allclose(values.std(axis=0), (high - low) / 12**0.5, rtol=0.05)
 
 
-@pytest.mark.parametrize("name", ikgym.scenarios.names())
+@pytest.mark.parametrize("name", [*ikgym.scenarios.names(), "rlitg-random"])
 def test_reach_bounds_the_positions(name):
     scenario = ikgym.scenarios.get(name)
     times = scenario.times(3000)

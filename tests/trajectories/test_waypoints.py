@@ -1,7 +1,5 @@
 """Waypoints from arrays and CSV files."""
 
-import time
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -65,25 +63,6 @@ def test_a_file_gives_what_its_arrays_give(tmp_path):
     np.testing.assert_array_equal(got.path.points, POINTS)
 
 
-TIMING = {"speed": 1.0, "acceleration": 1.0}
-
-
-@pytest.mark.parametrize(
-    "given",
-    [TIMING, *(pytest.param(one, marks=pytest.mark.slow) for one in ({**TIMING, "corner_radius": 1e-4}, {}))],
-    ids=["spline", "polyline", "times"],
-)
-def test_the_largest_file_takes_seconds(given, tmp_path):
-    """The time of the process, since other tests run beside it; samples of all intervals at once took 35 s, 5.9 GiB."""
-    s = 0.01 * np.arange(200_000)
-    columns = [np.cos(s), np.sin(s), 0.01 * s, np.cos(s), np.sin(s), 0.0 * s, 0.0 * s, s][: 7 if given else 8]
-    file, head = tmp_path / "points.csv", ",".join(HEAD.split(",")[: len(columns)]).strip()
-    np.savetxt(file, np.column_stack(columns), delimiter=",", header=head, comments="", fmt="%.6f")
-    begin = time.process_time()
-    from_csv(file, **given).frames(np.linspace(0.0, 1.0, 1000), ARM)
-    assert time.process_time() - begin < 10.0
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -101,14 +80,11 @@ def test_the_largest_file_takes_seconds(given, tmp_path):
         ("x,y,z\n", "points.csv: points: expected from 2 to 200000 waypoints, got 0"),
         ("x,y,z\n1,2,0\0\n", "line 2, column z: expected a finite number, got"),
         ("x,y,z\n1,2," + "3" * 2**18 + "\n", "expected a CSV file: field larger than"),
-        ("x,y,z\n" + "\n" * 10**7, "expected at most 200000 waypoints, got more"),
+        ("x,y,z\n" + "\n" * 3 * 10**5, "expected at most 200000 waypoints, got more"),
         (HEAD + "1,2,3,1,0,0,0,0\n", "points.csv: times: expected from 2 to 200000 waypoints, got 1"),
         (HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,0,0,0,0\n", "rise, got 0 s and 0 s as numbers 0 and 1"),
         (HEAD + "1,2,3,1,0,0,0,-1\n4,5,6,1,0,0,0,0\n", "expected times from 0 on, got -1 s as the first"),
-        (
-            HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,1,0,0,1\n",
-            "expected unit quaternions, .* of length 1.41421 as number",
-        ),
+        (HEAD + "1,2,3,1,0,0,0,0\n4,5,6,1,1,0,0,1\n", "expected unit quaternions, .* of length 1.41421 as number"),
     ],
 )
 def test_bad_files(text, message, tmp_path):

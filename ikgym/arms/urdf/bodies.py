@@ -31,17 +31,8 @@ def with_bodies(arm: Arm, tree: Tree, base: str, folder: Path | None) -> Arm:
     """The arm with capsules around the collision geometry of all links below the base.
 
     Geometry of a link off the chain is fixed, at the zero position of its joints, to the link of the chain before it.
-    Pairs that touch in each of 100 random postures are ignored, and the log names them.
-
-    Args:
-        arm: The arm without bodies.
-        tree: The links of the file.
-        base: The link at which the arm begins.
-        folder: Folder of the file, None where meshes stay closed.
-
-    Raises:
-        InvalidInputError: A shape is wrong, or there are too many.
-        MissingDependencyError: A mesh cannot be opened for lack of trimesh or SciPy.
+    Pairs that touch in each of 100 random postures are ignored, and the log names them. Without a folder meshes stay
+    closed.
     """
     found: list[tuple[str, int, Capsule]] = []
     solids: list[Solid] = []

@@ -14,19 +14,8 @@ def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list
     """The link at the beginning of a chain, and its joints.
 
     The links of the whole file must be a tree. Numbers are checked between the two links only: no other joint
-    has a say in where the tip is.
-
-    Args:
-        tree: The links of the file.
-        base: Link to begin at, the root if it is None.
-        tip: Link to end at, the only leaf below the base that moves if it is None.
-
-    Returns:
-        The base, and the joints from there to the tip.
-
-    Raises:
-        InvalidInputError: There is no chain of readable joints from base to tip.
-        UnknownNameError: There is no such link.
+    has a say in where the tip is. Without a base it begins at the root, and without a tip it ends at the only leaf that
+    moves.
     """
     known_names("link", [link for link in (base, tip) if link is not None], tree.links)
     base = tree.root if base is None else base
@@ -43,11 +32,7 @@ def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list
 
 
 def only_tip(tree: Tree, base: str) -> str:
-    """The one leaf below the base that moves; the only leaf where none does.
-
-    Raises:
-        InvalidInputError: There are several, and the message has them, likely ones first; or none of several moves.
-    """
+    """The one leaf below the base that moves; the only leaf where none does."""
     leaves = tree.leaves(base)
     found = [tip.link for tip in likely_tips(tree, base)] if len(leaves) > 1 else leaves
     if not found:

@@ -41,23 +41,13 @@ class Capsule(NamedTuple):
 
 
 def along(axis: int, length: float, radius: float) -> Capsule:
-    """A capsule in the middle of the frame along one of its axes.
-
-    Args:
-        axis: Number of the axis.
-        length: Between the ends in [m].
-        radius: In [m].
-    """
+    """A capsule in the middle of the frame along one of its axes, by its number; lengths in [m]."""
     end = 0.5 * length * np.eye(3)[axis]
     return Capsule(-end, end, radius)
 
 
 def around_box(size: tuple[float, ...]) -> list[Capsule]:
-    """Capsules along the longest edge of a box, side by side where it is flat; a sphere where that is smaller.
-
-    Args:
-        size: Its edges in [m]. Three numbers.
-    """
+    """Capsules along the longest edge of a box, side by side where it is flat; a sphere where that is smaller."""
     thin, wide, long = np.argsort(size, kind="stable").tolist()
     count = min(MOST, round(size[wide] / size[thin]))
     strip = size[wide] / count
@@ -70,14 +60,7 @@ def around_box(size: tuple[float, ...]) -> list[Capsule]:
 
 
 def around(points: FloatArray) -> Capsule:
-    """A capsule around points, the smallest that a search finds from each of their principal axes.
-
-    Args:
-        points: In [m]. Shape (p, 3).
-
-    Raises:
-        MissingDependencyError: SciPy is not installed.
-    """
+    """A capsule around points (p, 3) in [m], the smallest that a search finds from each of their principal axes."""
     outer = _outer(points)
     axes = np.linalg.svd(outer - outer.mean(axis=0))[2]
     ends = min((_searched(outer, axis) for axis in axes), key=lambda found: _cost(found, outer))

@@ -27,20 +27,7 @@ class Solid(NamedTuple):
 
 
 def read_solid(where: str, collision: Element, folder: Path | None) -> Solid | None:
-    """The solid of a ``<collision>``.
-
-    Args:
-        where: The link in messages.
-        collision: The element.
-        folder: Folder of the URDF file, None where meshes stay closed.
-
-    Returns:
-        The solid, or None for a mesh that stays closed.
-
-    Raises:
-        InvalidInputError: It has no shape that URDF knows, or a size is wrong.
-        MissingDependencyError: A mesh cannot be opened for lack of trimesh or SciPy.
-    """
+    """The solid of a ``<collision>``; None for a mesh where no folder says that meshes are opened."""
     geometry = list(xml.required(where, collision, "geometry"))
     if len(geometry) != 1 or geometry[0].tag not in (*READERS, "mesh"):
         got = xml.listing([shape.tag for shape in geometry])

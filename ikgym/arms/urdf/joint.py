@@ -43,11 +43,7 @@ class UrdfJoint(NamedTuple):
 
 
 def read_joint(element: Element) -> UrdfJoint:
-    """A joint on the way to the tip.
-
-    Raises:
-        InvalidInputError: It is of a kind that no arm has, or a number is missing or wrong; the message names it.
-    """
+    """A joint on the way to the tip."""
     where, kind, name = xml.label(element), element.get("type", ""), element.get("name", "")
     if kind not in READABLE:
         raise InvalidInputError(

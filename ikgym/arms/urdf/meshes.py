@@ -20,19 +20,9 @@ LEVELS = 8
 
 
 def corners(where: str, name: str, folder: Path) -> tuple[FloatArray, float]:
-    """The corners of a mesh and the volume of their convex hull.
+    """The corners of a mesh, of shape (p, 3), and the volume of their convex hull, in the unit of the mesh.
 
-    Args:
-        where: The link in messages.
-        name: Its name in the URDF file: a path from that file, or ``package://…``, or ``file://…``.
-        folder: Folder of the URDF file.
-
-    Returns:
-        Points in the unit of the mesh, of shape (p, 3), and the volume in that unit.
-
-    Raises:
-        InvalidInputError: There is no such file, or it is no mesh.
-        MissingDependencyError: trimesh is not installed.
+    Its name is a path from the folder of the URDF file, or ``package://…``, or ``file://…``.
     """
     try:
         import trimesh

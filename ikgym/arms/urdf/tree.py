@@ -23,10 +23,6 @@ class Tree:
         name: Name of the robot.
         links: Names of all links.
         root: The link above all others.
-
-    Raises:
-        InvalidInputError: It is no URDF, a name is missing or taken, a joint does not join two links, or they are no
-            tree.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -75,11 +71,7 @@ class Tree:
         return self._elements[link].findall("collision")
 
     def path(self, base: str, tip: str) -> list[Element]:
-        """The joints from base to tip.
-
-        Raises:
-            InvalidInputError: The base is not above the tip, or there are too many joints.
-        """
+        """The joints from base to tip."""
         joints: list[Element] = []
         passed = [tip]
         while passed[-1] != base:

@@ -14,11 +14,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORE
 
 
 def parse(data: bytes) -> Element:
-    """The root of an XML document; prefixes of names are letters like all others, declared or not.
-
-    Raises:
-        InvalidInputError: It is no XML, or has a DOCTYPE.
-    """
+    """The root of an XML document; prefixes of names are letters like all others, declared or not."""
     parser, tree = expat.ParserCreate(), TreeBuilder()
     # Entities are declared in a DOCTYPE only: without one there are none that could be expanded.
     parser.StartDoctypeDeclHandler = _refuse_doctype

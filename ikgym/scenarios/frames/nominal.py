@@ -61,14 +61,7 @@ class NominalFrames:
         return self.point % self.shape[1]
 
     def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
-        """Begins new episodes of a random scenario.
-
-        Args:
-            tables: Result of :meth:`allocate`.
-            rows: Which rows begin one. Shape (k,).
-            episodes: Their trajectories.
-            steps: Steps after which they are entered. Shape (k,).
-        """
+        """Begins new episodes of a random scenario in some rows, entered after some steps. Shapes (k,)."""
         for row, episode in zip(rows.tolist(), episodes, strict=True):
             self._episodes[row] = episode
         self._blocks_known[rows] = self.point[steps] // self._block

@@ -26,8 +26,7 @@ class Line(Path):
     end: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("start", "end"):
-            self._settle(**{name: frozen_array(name, getattr(self, name), (3,), at_most=LARGEST)})
+        self._settle_by(frozen_array, "start", "end", shape=(3,), at_most=LARGEST)
         points_of("start and end", [self.start, self.end])
 
     @property

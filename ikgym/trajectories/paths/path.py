@@ -68,24 +68,13 @@ class Outline(Path):
 
 
 def settle_placement(path: Path) -> None:
-    """Checks the center and the rotation that place a plane figure.
-
-    Raises:
-        InvalidInputError: The center is no point, or the rotation none.
-    """
-    for name, value in {
-        "center": frozen_array("center", getattr(path, "center"), (3,), at_most=LARGEST),  # noqa: B009
-        "rotation": rotation_matrix("rotation", getattr(path, "rotation")),  # noqa: B009
-    }.items():
-        object.__setattr__(path, name, value)
+    """Checks the center and the rotation that place a plane figure."""
+    path._settle_by(frozen_array, "center", shape=(3,), at_most=LARGEST)
+    path._settle_by(rotation_matrix, "rotation")
 
 
 def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Two points or more, of which no two that follow each other are the same. Shape (k, 3).
-
-    Raises:
-        InvalidInputError: There are fewer, or too many, or one is repeated; the message says which.
-    """
+    """Two points or more, of which no two that follow each other are the same. Shape (k, 3)."""
     points = frozen_array(name, value, (None, 3), at_most=LARGEST)
     check_count(name, points)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -99,11 +88,7 @@ def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
 
 
 def check_count(name: str, points: FloatArray) -> None:
-    """Checks that there are at least 2 waypoints, and not too many.
-
-    Raises:
-        InvalidInputError: There are fewer, or more.
-    """
+    """Checks that there are at least 2 waypoints, and not too many."""
     if not 2 <= len(points) <= MOST_POINTS:
         raise InvalidInputError(f"{name}: expected from 2 to {MOST_POINTS} waypoints, got {len(points)}.")
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, points_of, settle_placement
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, whole_number
+from ikgym.validation import SMALLEST, FloatArray, number, positive, whole_number
 
 # Corners that turn by less than this, in [rad], are none.
 STRAIGHT = 1e-9
@@ -53,8 +53,8 @@ class Polyline(Path):
     corner_radius: float
 
     def __post_init__(self) -> None:
-        self._settle(points=points_of("points", self.points))
-        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=LARGEST)
+        self._settle_by(points_of, "points")
+        radius = positive("corner_radius", self.corner_radius)
         self._settle(corner_radius=radius)
         self._check_corners()
 
@@ -162,7 +162,7 @@ class Square(Outline):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        self._settle(side=number("side", self.side, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "side")
         radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=0.5 * self.side)
         self._settle(corner_radius=radius)
 
@@ -200,8 +200,7 @@ class Raster(Outline):
     def __post_init__(self) -> None:
         settle_placement(self)
         self._settle(lines=whole_number("lines", self.lines, at_least=2, at_most=MOST_POINTS // 2))
-        for name in ("width", "height"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
+        self._settle_by(positive, "width", "height")
         most = 0.5 * min(self.height / (self.lines - 1), self.width)
         radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=most)
         self._settle(corner_radius=radius)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym.trajectories.paths.path import Path, settle_placement
 from ikgym.trajectories.splines import ArcLength
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, number, signed
+from ikgym.validation import FloatArray, positive, signed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,9 +36,8 @@ class CircularHelix(Path):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        for name in ("radius", "turns"):
-            self._settle(**{name: number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)})
-        self._settle(pitch=signed("pitch", self.pitch))
+        self._settle_by(positive, "radius", "turns")
+        self._settle_by(signed, "pitch")
 
     @property
     def length(self) -> float:
@@ -101,7 +100,7 @@ class Lemniscate(Path):
 
     def __post_init__(self) -> None:
         settle_placement(self)
-        self._settle(radius=number("radius", self.radius, at_least=SMALLEST, at_most=LARGEST))
+        self._settle_by(positive, "radius")
 
     @property
     def length(self) -> float:

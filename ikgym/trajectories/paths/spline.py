@@ -35,7 +35,7 @@ class SplinePath(Path):
     _curvature: float = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._settle(points=points_of("points", self.points))
+        self._settle_by(points_of, "points")
         least, i, curvature = extremes(self._spline.knots, self._spline.values, self._spline.slopes, SAMPLES)
         if least < LEAST_SPEED:
             raise InvalidInputError(
