@@ -7,6 +7,7 @@ import pytest
 
 import baselines
 import ikgym
+from tests.baselines.solvers.adaptive.arms import observed
 from tests.baselines.solvers.resolved_rate.test_formulas import invert, jacobians, move, objective_gradient
 
 
@@ -16,11 +17,10 @@ def with_limits(scenario):
     return scenario.replace(arm=arm, model=arm)
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-3])
 @pytest.mark.parametrize(
-    "aim", [{"objective": "posture", "posture": 0.7}, {"objective": "joint_centring"}], ids=lambda aim: aim["objective"]
+    ("aim", "damping"), [({"objective": "posture", "posture": 0.7}, 0.0), ({"objective": "joint_centring"}, 1e-3)]
 )
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q7q8", "zhang6-lspb", "faitli3-regular"])
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q7q8", "zhang6-lspb"])
 def test_changes_no_task_velocity(name, aim, damping):
     scenario = with_limits(ikgym.scenarios.get(name))
     gain = 1.0 / scenario.dt
@@ -70,13 +70,7 @@ def test_gets_nearer_to_its_aim_while_the_task_stands_still(objective):
     target = scenario.task.coordinates(*scenario.model.forward(here))
     q, state, merits = here.copy(), None, []
     for _ in range(200):
-        observation = {
-            "q": q,
-            "qdot": np.zeros(7),
-            "pose": scenario.task.coordinates(*scenario.model.forward(q)),
-            "nominal": target[None],
-            "remaining": np.ones(1),
-        }
+        observation = observed(scenario, scenario.model, 0.0, q, target)
         action, state = policy.predict(observation, state)
         q = q + scenario.dt * action * scenario.velocity_limit
         merits.append(merit(q))
