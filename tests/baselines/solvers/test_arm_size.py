@@ -20,9 +20,7 @@ def sway(arm, task="position"):
     """A motion around the home posture of the Panda; the reference goes with the arm's size."""
     n = arm.joints
     trajectory = Sinusoid(np.linspace(0.1, 0.3, n), np.linspace(2.0, 4.0, n), np.zeros(n), np.asarray(arm.home))
-    return ikgym.scenarios.Scenario(
-        "sway", arm, ikgym.tasks.get(task), trajectory, steps=150, velocity_limit=20.0
-    )
+    return ikgym.scenarios.Scenario("sway", arm, ikgym.tasks.get(task), trajectory, steps=150, velocity_limit=20.0)
 
 
 def test_a_radian_counts_as_the_root_of_the_length():
