@@ -163,16 +163,6 @@ def test_a_change_of_joint_zeros_is_noticed(name, parameter, change):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_on_an_exact_model_the_base_policy_acts_as_if_it_were_alone(name):
-    on, states = scenario(), [None, None]
-    policies = baselines.make("dls", on), made(name)
-    for q, target in zip(path(0, 5), path(0, 6)[1:], strict=True):
-        seen = observed(on, PANDA, 0.0, q, on.task.coordinates(*PANDA.forward(target)))
-        (one, states[0]), (other, states[1]) = (p.predict(seen, s) for p, s in zip(policies, states, strict=True))
-        np.testing.assert_allclose(one, other, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("task", ikgym.tasks.names())
 def test_the_base_policy_leads_another_arm_to_the_reference(name, task):
     """The first step of a base policy of gain 1 ends where the arm, not the model, is at the reference."""

@@ -38,15 +38,6 @@ def test_equals_the_dense_formula(n, damping):
         np.testing.assert_allclose(by_blocks(jacobians, residuals, damping), wanted, atol=rounding * abs(wanted).max())
 
 
-def test_without_damping_the_blocks_come_apart():
-    """(38): the right inverse of Ψ̄, here with Jacobians wider than tall."""
-    rng = np.random.default_rng(0)
-    jacobians, residuals = rng.normal(size=(4, 3, 5)), rng.normal(size=(4, 3))
-    wanted = [np.linalg.pinv(jacobians[0]) @ residuals[0]]
-    wanted += [np.linalg.pinv(jacobians[j]) @ (residuals[j] - residuals[j - 1]) for j in range(1, 4)]
-    np.testing.assert_allclose(by_blocks(jacobians, residuals, 0.0), wanted, atol=1e-12)
-
-
 def test_says_where_rank_is_lost():
     rng = np.random.default_rng(0)
     jacobians, residuals = rng.normal(size=(3, 3, 4)), rng.normal(size=(3, 3))

@@ -23,21 +23,6 @@ def now(rule, error=1.0, condition=1.0, stepped=np.nan, **numbers):
     return damping_now(law(rule, **numbers), error, condition, stepped)
 
 
-@pytest.mark.parametrize(("condition", "wanted"), [(1.0, 0.0), (9.9, 0.0), (10.0, 0.1), (99.0, 0.1), (np.inf, 0.5)])
-def test_condition(condition, wanted):
-    """(37): each bound belongs to the interval behind it."""
-    assert now("condition", condition=condition, condition_bounds=(10, 100), dampings=(0, 0.1, 0.5)) == wanted
-
-
-@pytest.mark.parametrize(
-    ("error", "condition", "wanted"), [(0.5, 5, 0), (0.5, 50, 1), (1.0, 5, 2), (3.0, 50, 3), (1e9, 1e9, 3)]
-)
-def test_table(error, condition, wanted):
-    """Table I: rows by the error, columns by the condition."""
-    numbers = {"error_bounds": (1.0,), "condition_bounds": (10.0,), "dampings": ((0, 1), (2, 3))}
-    assert now("table", error, condition, **numbers) == wanted
-
-
 @pytest.mark.parametrize(
     ("restart", "error", "before", "wanted"),
     [
