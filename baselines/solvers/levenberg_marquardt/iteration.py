@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
 from baselines.solvers.levenberg_marquardt.damping import (
     DampingLaw,
@@ -81,8 +80,9 @@ def iteration_step(model, numbers, seen, memory, answer):
     starts, poses, nominal, (damping, error_before) = seen.q, seen.pose, seen.nominal, memory
     q, status, iterations = answer
     n, m = q.shape[1], poses.shape[1]
-    rotation, position, geometric, coordinates = pose_arrays(n, m)
-    present, path, jacobians = np.empty(m), np.empty((horizon, n)), np.empty((horizon, size, n))
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
+    present, coordinates = np.empty(m), np.empty(m)
+    path, jacobians = np.empty((horizon, n)), np.empty((horizon, size, n))
     residuals, error = np.empty((horizon, size)), np.empty(size)
     differences = residuals if horizon == 1 else np.empty((horizon, size))
     jacobian, residual = jacobians[0], residuals[0]

@@ -76,7 +76,7 @@ def test_is_what_the_paper_prints(name, parameters):
         qdot = action * scenario.velocity_limit
         np.testing.assert_allclose(qdot, (wanted - observation["q"]) / scenario.dt, rtol=1e-4, atol=1e-6)
         np.testing.assert_allclose(state[2][0], last, rtol=1e-6, atol=1e-7)
-        np.testing.assert_allclose(np.ravel(policy.angles(state)), angles, rtol=1e-5, atol=2e-6)
+        np.testing.assert_allclose(np.ravel(list(policy.diagnostics(state).values())), angles, rtol=1e-5, atol=2e-6)
         observation, *_ = env.step(action)
 
 
@@ -105,4 +105,4 @@ def test_too_long_a_vector_stops_the_arm_and_says_so():
     action, state = policy.predict(batch)
     assert policy.report(state).status.tolist() == [Status.NOT_A_ROTATION, Status.CONVERGED]
     np.testing.assert_array_equal(action, 0.0)
-    assert np.isnan(policy.angles(state).abstract_rotation).tolist() == [True, False]
+    assert np.isnan(policy.diagnostics(state)["angle_abstract_rotation"]).tolist() == [True, False]
