@@ -66,12 +66,12 @@ def printed(scenario, q, target, a, transformation, components, last):
     ],
 )
 def test_is_equation_1(name, transformation, components):
-    """In three steps, each larger than the one before and the other way: signs are remembered."""
+    """In two steps, the second of which is shorter and the other way: signs are remembered."""
     scenario, last, state = ikgym.scenarios.get(name), None, None
     given = {"transformation": transformation, "iterations": 5, "d": 0.2, "slope": 0.4, "a": -0.004}
     given |= {"length": 1.0} if components is None else {"components": components}  # nothing is weighed in the paper
     policy = baselines.make("fixed_point", name, **given)
-    for by in (1e-3, -2e-3, 4e-3):
+    for by in (2e-3, -1e-3):
         seen = away(np.linspace(0.2, 0.7, scenario.joints), by, name)
         q, state, _ = stepped(policy, seen, state)
         wanted, last = printed(scenario, seen["q"], seen["nominal"][0], -0.004, transformation, components, last)
