@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
-from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.preview import offsets as checked_offsets
 from ikgym.validation import FloatArray, Frozen, known_names
 
 
@@ -41,7 +39,8 @@ class Processing(Frozen, abc.ABC):
 
     def to_json(self) -> dict[str, Any]:
         """The kind and the fields, as JSON values."""
-        return {"kind": self.kind, **{name: _plain(getattr(self, name)) for name in _fields(type(self))}}
+        values = {name: getattr(self, name) for name in _fields(type(self))}
+        return {"kind": self.kind, **{k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -86,26 +85,5 @@ class Processing(Frozen, abc.ABC):
         """
 
 
-def check_offsets(offsets: tuple[int, ...]) -> tuple[tuple[int, ...], npt.NDArray[np.int64]]:
-    """Steps ahead at which an agent sees the reference trajectory, and the same as a read-only array for kernels.
-
-    Raises:
-        InvalidInputError: There are fewer than two, or they do not rise from 1 or more.
-    """
-    try:
-        steps = checked_offsets(offsets)
-    except InvalidInputError as e:
-        raise InvalidInputError(str(e).replace("preview", "offsets", 1)) from None
-    if len(steps) < 2:
-        raise InvalidInputError(f"offsets: expected at least two steps ahead, got {offsets}.")
-    array = np.array(steps, dtype=np.int64)
-    array.flags.writeable = False
-    return steps, array
-
-
 def _fields(kind: Any) -> list[str]:
     return [field.name for field in dataclasses.fields(kind) if field.init]
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value

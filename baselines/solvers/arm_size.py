@@ -50,14 +50,9 @@ def error_weights(task: Task, metres: float) -> FloatArray:
         1 for components of the position, the square of ``metres`` for others. Shape (e,).
     """
     weights = np.full(task.error_size, metres * metres)
-    weights[position_rows(task)] = 1.0
+    # The position is first beside rotation vectors and axes, last behind parts of a matrix.
+    weights[slice(0, 3) if task.kind in (task_kernels.POSE, task_kernels.AXIS) else slice(-3, None)] = 1.0
     return weights
-
-
-def position_rows(task: Task) -> slice:
-    """Slice of the position in an error: first for rotation vectors and axes, last behind parts of a matrix."""
-    first = task.kind in (task_kernels.POSE, task_kernels.AXIS)
-    return slice(0, 3) if first else slice(task.error_size - 3, task.error_size)
 
 
 def jacobian_bound(arm: Arm, task: Task | None, metres: float = 1.0) -> float:

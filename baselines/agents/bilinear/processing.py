@@ -12,12 +12,13 @@ import numpy.typing as npt
 from baselines.agents.bilinear.features import shown_joints
 from baselines.agents.bilinear.kernels import law_rows
 from baselines.agents.network import Network
-from baselines.agents.processing import Held, Processing, check_offsets
+from baselines.agents.processing import Held, Processing
 from baselines.policy import Batch, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.twists import twist_size
+from ikgym.scenarios.preview import offsets as checked_offsets
 from ikgym.validation import FloatArray, number, whole_number
 
 
@@ -72,9 +73,16 @@ class Bilinear(Processing):
     kind: ClassVar[str] = "bilinear"
 
     def __post_init__(self) -> None:
-        offsets, ahead = check_offsets(self.offsets)
-        if offsets[0] != 1:
-            raise InvalidInputError(f"offsets: expected steps ahead that rise from 1, got {self.offsets}.")
+        try:
+            offsets = checked_offsets(self.offsets)
+        except InvalidInputError as e:
+            raise InvalidInputError(str(e).replace("preview", "offsets", 1)) from None
+        if len(offsets) < 2 or offsets[0] != 1:
+            raise InvalidInputError(
+                f"offsets: expected steps ahead that rise from 1, at least two, got {self.offsets}."
+            )
+        ahead = np.array(offsets, dtype=np.int64)
+        ahead.flags.writeable = False
         damping = None if self.damping is None else number("damping", self.damping, above=0.0)
         interval = whole_number("interval", self.interval, at_least=1)
         for field, value in {"offsets": offsets, "damping": damping, "interval": interval, "_ahead": ahead}.items():

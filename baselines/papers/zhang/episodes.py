@@ -10,8 +10,8 @@ from baselines.papers.runs import Runs
 from baselines.policy import Batch
 from baselines.recording import Episode
 from baselines.registry import make
-from baselines.solvers.levenberg_marquardt.base import DampingMemory
 from baselines.solvers.levenberg_marquardt.damping import typical_link
+from baselines.solvers.levenberg_marquardt.iteration import DampingMemory
 from baselines.solvers.levenberg_marquardt.presets import HelixPredictiveControl
 from baselines.status import Status
 from ikgym.scenarios import Scenario

@@ -10,12 +10,10 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.parameters import parameter
-from baselines.solvers.arm_task import task_shift
-from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, finish
+from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, add_feedback, task_motion
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number
 
 
@@ -54,70 +52,47 @@ class BroydenNumbers(NamedTuple):
 @kernel
 def broyden_step(model, numbers, seen, memory, answer):
     """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
-    q, pose, nominal = seen.q, seen.pose, seen.nominal
-    before, known, _, q_before, pose_before = memory
-    estimate = learn_rows(model, numbers, q, pose, memory)
-    error, shift = np.empty(estimate.shape[1]), np.empty(estimate.shape[:2])
-    for row in range(q.shape[0]):
-        present = before[row] if known[row] else pose[row]
-        task_shift(model.kind, numbers.gain, pose[row], nominal[row, 0], present, error, shift[row])
-    damped_rows(estimate, shift, numbers.damping, answer.qdot)
+    answer.iterations[:] = memory.known
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    learn_rows(model.kind, numbers.motion, seen, answer.iterations, memory, jacobian)
+    add_feedback(numbers.gain, error, shift)
+    damped_rows(jacobian, shift, numbers.damping, answer.qdot)
     answer.status[:] = APPLIED
-    finish(model, answer)
-    for row in range(q.shape[0]):
-        answer.iterations[row] = known[row]
-        known[row] = True
-        for i in range(before.shape[1]):
-            before[row, i], pose_before[row, i] = nominal[row, 0, i], pose[row, i]
-        for j in range(q.shape[1]):
-            q_before[row, j] = q[row, j]
+    for row in range(shift.shape[0]):
+        for j in range(answer.qdot.shape[1]):
+            answer.qdot[row, j] /= model.dt
 
 
 @inner
-def learn_rows(model, numbers, q, pose, memory):
-    """Estimates B of the Jacobian, row by row.
+def learn_rows(kind, motion, seen, had, memory, jacobian):
+    """Makes estimates of Jacobians, row by row, and remembers the step.
 
     Args:
-        model: The :class:`Model`.
-        numbers: The :class:`BroydenNumbers`.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        pose: Measured task coordinates. Shape (B, m).
-        memory: The :class:`BroydenMemory`; only what is learnt is changed, in place.
-
-    Returns:
-        B, of shape (B, e, n).
+        kind: The kind of task coordinates.
+        motion: ε.
+        seen: The observations, a :class:`Seen`.
+        had: Whether there was a step before. Shape (B,).
+        memory: The :class:`BroydenMemory`, changed in place.
+        jacobian: Those of the model; become their estimates B. Shape (B, e, n).
     """
-    chain, kind = model.chain, model.kind
-    _, had, corrections, q_before, pose_before = memory
-    estimate = np.empty(corrections.shape)
-    e, n = estimate.shape[1], estimate.shape[2]
-    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    error, moved, jacobian = np.empty(e), np.empty(n), np.zeros((e, n))
-    for row in range(q.shape[0]):
-        known, learnt = had[row], corrections[row]
-        forward_and_jacobian(chain, q[row], rotation, position, geometric)
-        task_kernels.jacobian(kind, rotation, geometric, jacobian)
-        if known:
-            square = numbers.motion * numbers.motion
-            for k in range(n):
-                moved[k] = q[row, k] - q_before[row, k]
-                square += moved[k] * moved[k]
-            task_kernels.error(kind, pose[row], pose_before[row], error)  # Δy
-            _learn(jacobian, moved, square, error, learnt)
+    rows, e, n = jacobian.shape
+    missing, moved = np.empty(e), np.empty(n)
+    for row in range(rows):
+        estimate, learnt = jacobian[row], memory.learnt[row]
+        square = motion * motion
+        for k in range(n):
+            moved[k] = seen.q[row, k] - memory.q[row, k]
+            square += moved[k] * moved[k]
+        task_kernels.error(kind, seen.pose[row], memory.pose[row], missing)  # Δy
         for a in range(e):
+            if had[row]:
+                for k in range(n):
+                    missing[a] -= (estimate[a, k] + learnt[a, k]) * moved[k]
+                for k in range(n):
+                    learnt[a, k] += missing[a] * moved[k] / square
             for k in range(n):
-                estimate[row, a, k] = jacobian[a, k] + learnt[a, k]
-    return estimate
-
-
-@inner
-def _learn(jacobian, moved, square, error, learnt):
-    """Broyden's formula for one row: shapes (e, n), (n,), a number, (e,), which is overwritten, and (e, n)."""
-    for a in range(error.shape[0]):
-        for k in range(moved.shape[0]):
-            error[a] -= (jacobian[a, k] + learnt[a, k]) * moved[k]
-        for k in range(moved.shape[0]):
-            learnt[a, k] += error[a] * moved[k] / square
+                estimate[a, k] += learnt[a, k]
+        memory.q[row], memory.pose[row] = seen.q[row], seen.pose[row]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -14,7 +14,6 @@ from baselines.policy import Memory, Problem
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import jacobian_bound
-from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
@@ -35,24 +34,12 @@ _JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["t
 _CONVERGED, _LIMIT, _NO_ROTATION = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.NOT_A_ROTATION)
 
 
-class Angles(NamedTuple):
-    """Angles of the last rotation (Fig. 6, 15 and 18); NaN where there was none.
-
-    Attributes:
-        counter_rotation: Angle of 𝒩 in [rad], between 0 and π. Shape (B,).
-        abstract_rotation: λ_a φ in [rad]. Shape (B,).
-    """
-
-    counter_rotation: FloatArray
-    abstract_rotation: FloatArray
-
-
 class RotationMemory(NamedTuple):
     """Memory of the previous step.
 
     Attributes:
         direction: h(n-1), or ℱ (xᴺ - f) where 𝒩 turns task coordinates; zero at the start. Shape (B, n or m).
-        angles: The angles of both rotations, those of :class:`Angles`. Shape (B, 2).
+        angles: The angle of 𝒩, between 0 and π, and λ_a φ in [rad]; NaN where there was none. Shape (B, 2).
         point: The nominal point since which the Jacobian is held, NaN at the start; of no columns where it is not
             held. Shape (B, m or 0).
         held: The joint coordinates that it belongs to. Shape (B, n or 0).
@@ -92,7 +79,7 @@ def rotation_step(model, numbers, seen, memory, answer):
     q, pose, nominal, (direction, angles, point, held) = seen.q, seen.pose, seen.nominal, memory
     goals, status, iterations = answer
     n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
-    rotation, position, geometric, _ = pose_arrays(n, m)
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
     h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(turned), np.empty(turned)
     missing, seen, wanted = np.empty(m), np.empty(m), np.empty(m)
@@ -246,16 +233,10 @@ class AbstractRotation(CompiledPolicy):
         turned = m if self.counter_rotation == "task" else n
         return RotationMemory(np.zeros((rows, turned)), np.full((rows, 2), np.nan), point, held)
 
-    @staticmethod
-    def angles(state: Memory) -> Angles:
-        """The angles of both rotations in the call that returned a state."""
-        _status, _iterations, *memory = state
-        angles = RotationMemory(*memory).angles
-        return Angles(angles[:, 0].copy(), angles[:, 1].copy())
-
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """The angles of both rotations in [rad], see :class:`Angles`, as ``angle_counter_rotation`` and so on."""
-        return {f"angle_{name}": angle for name, angle in self.angles(state)._asdict().items()}
+        """The angles of both rotations in [rad], NaN where there was none (Fig. 6, 15 and 18), each of shape (B,)."""
+        angles = RotationMemory(*self.memory_of(state)).angles
+        return {"angle_counter_rotation": angles[:, 0].copy(), "angle_abstract_rotation": angles[:, 1].copy()}
 
     def numbers(self) -> RotationNumbers:
         """See :meth:`CompiledPolicy.numbers`."""

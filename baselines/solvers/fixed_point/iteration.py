@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.arm_task import pose_arrays
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
@@ -87,9 +86,9 @@ def fixed_point_step(model, numbers, seen, memory, answer):
     q, status, made = answer
     n, m, joints = q.shape[1], nominal.shape[2], chain_to_point.axes.shape[0]
     e = task_kernels.error_size(kind, m)
-    rotation, position, geometric, pose = pose_arrays(n, m)
+    rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
-    h, weighted, missing = np.empty(n), np.empty(e), np.empty(3)
+    h, weighted, missing, pose = np.empty(n), np.empty(e), np.empty(3), np.empty(m)
     for row in range(q.shape[0]):
         start, here, target = starts[row], q[row], nominal[row, 0]
         for j in range(n):

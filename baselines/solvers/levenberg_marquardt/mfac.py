@@ -5,91 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
-from baselines.solvers.arm_task import pose_arrays
-from baselines.solvers.levenberg_marquardt.base import (
-    APPLIED,
-    CONVERGED,
-    DEFICIENT,
-    DIVERGED,
-    LIMIT,
-    RANK_TOLERANCE,
-    DampedIteration,
-    begin,
-    finish,
-    stop_run_away,
-)
-from baselines.solvers.levenberg_marquardt.damping import (
-    DampingLaw,
-    condition_number,
-    condition_scratch,
-    damping_next,
-    damping_now,
-)
-from baselines.solvers.linear_algebra import damped_step, dot, pseudoinverse_rows
-from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import kernel
-from ikgym.kernels.kinematics import forward_and_jacobian
-
-
-@kernel
-def mfac_step(model, numbers, seen, memory, answer):
-    """The iteration (11)-(17) row by row; see :class:`CompiledPolicy` for the arguments."""
-    chain, kind, dt, rule = model.chain, model.kind, model.dt, DampingLaw(*numbers.law)
-    size, rank, longest, tolerance = numbers.size, numbers.rank, numbers.longest, numbers.tolerance
-    most, one_step, carry = numbers.most, numbers.one_step, numbers.carry
-    starts, poses, nominal, (damping, error_before) = seen.q, seen.pose, seen.nominal, memory
-    q, status, iterations = answer
-    n = q.shape[1]
-    rotation, position, geometric, coordinates = pose_arrays(n, poses.shape[1])
-    # With the leading axis that the pseudoinverse wants; without it, as views made once.
-    jacobians, errors, steps = np.empty((1, size, n)), np.empty((1, size)), np.empty((1, n))
-    jacobian, error, step, lost = jacobians[0], errors[0], steps[0], np.empty(1, dtype=np.bool_)
-    gram, x, scratch = np.empty((size, size)), np.empty(size), condition_scratch(size, n)
-    for row in range(q.shape[0]):
-        start, here, i, first = starts[row], q[row], 0, 0.0
-        for k in range(n):
-            here[k] = start[k]
-        status[row] = LIMIT
-        begin(rule, carry, row, memory)
-        while True:
-            forward_and_jacobian(chain, here, rotation, position, geometric)  # (11), (12)
-            task_kernels.jacobian(kind, rotation, geometric, jacobian)
-            task_kernels.coordinates(kind, rotation, position, coordinates)
-            task_kernels.error(kind, nominal[row, 0], poses[row] if one_step else coordinates, error)
-            norm = np.sqrt(dot(error, error))
-            if i == 0:
-                first = norm
-            if not np.isfinite(norm):
-                status[row] = DIVERGED
-                break
-            if norm <= tolerance and not one_step:  # (16)
-                status[row] = CONVERGED
-                break
-            if i == most:
-                break
-            condition = 1.0
-            if rule.condition_bounds.shape[0] > 0:
-                condition = condition_number(jacobian, rank, scratch)
-            damping[row] = damping_now(rule, norm, condition, damping[row])
-            if not damped_step(jacobian, error, damping[row], gram, x, step):  # (13)
-                pseudoinverse_rows(jacobians, errors, RANK_TOLERANCE, rank, steps, lost)
-                if lost[0]:
-                    status[row] = DEFICIENT
-            damping[row] = damping_next(rule, damping[row], norm, error_before[row])  # (14), (18)
-            error_before[row] = norm
-            for k in range(step.shape[0]):
-                here[k] += step[k]  # (15), (17)
-            i += 1
-            if one_step:
-                if status[row] == LIMIT:
-                    status[row] = APPLIED
-                break
-        iterations[row] = i
-        if not one_step and norm > first:
-            stop_run_away(here, start, longest, status[row : row + 1])
-        finish(dt, rule, row, start, status[row], memory, here)
+from baselines.solvers.levenberg_marquardt.base import DampedIteration
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -125,4 +41,3 @@ class ModelFreeAdaptiveControl(DampedIteration):
     rule: str = "error_ratio"
 
     name: ClassVar[str] = "mfac"
-    step = mfac_step

@@ -5,138 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
 from baselines.policy.parameters import choice, parameter
-from baselines.solvers.arm_task import pose_arrays
-from baselines.solvers.levenberg_marquardt.base import (
-    APPLIED,
-    CONVERGED,
-    DEFICIENT,
-    DIVERGED,
-    LIMIT,
-    RANK_TOLERANCE,
-    DampedIteration,
-    begin,
-    finish,
-    stop_run_away,
-)
-from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
-from baselines.solvers.levenberg_marquardt.damping import (
-    DampingLaw,
-    condition_number,
-    condition_scratch,
-    damping_next,
-    damping_now,
-)
-from baselines.solvers.linear_algebra import dot, pseudoinverse_rows
-from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from baselines.solvers.levenberg_marquardt.base import DampedIteration
+from baselines.solvers.levenberg_marquardt.iteration import IterationNumbers
 from ikgym.validation import whole_number
-
-
-@kernel
-def mfapc_step(model, numbers, seen, memory, answer):
-    """The iteration (34)-(41) row by row; see :class:`CompiledPolicy` for the arguments."""
-    chain, kind, dt, rule = model.chain, model.kind, model.dt, DampingLaw(*numbers.law)
-    size, rank, longest, tolerance = numbers.size, numbers.rank, numbers.longest, numbers.tolerance
-    most, one_step, carry = numbers.most, numbers.one_step, numbers.carry
-    horizon, predicted, whole_horizon = numbers.horizon, numbers.predicted, numbers.whole_horizon
-    starts, poses, nominal, (damping, error_before) = seen.q, seen.pose, seen.nominal, memory
-    q, status, iterations = answer
-    n, m = q.shape[1], poses.shape[1]
-    rotation, position, geometric, coordinates = pose_arrays(n, m)
-    present, path, jacobians = np.empty(m), np.empty((horizon, n)), np.empty((horizon, size, n))
-    residuals, differences, error = np.empty((horizon, size)), np.empty((horizon, size)), np.empty(size)
-    blocks = np.empty((size, size)), np.empty((horizon, size, size)), np.empty((horizon, size))
-    steps, lost, scratch = np.empty((horizon, n)), np.empty(horizon, dtype=np.bool_), condition_scratch(size, n)
-    for row in range(q.shape[0]):
-        start, here = starts[row], q[row]
-        for k in range(n):
-            here[k] = start[k]
-        status[row], i, first = LIMIT, 0, 0.0
-        begin(rule, carry, row, memory)
-        while True:
-            # y(k)_(i), J(k)_(i) and the residuals of all points from there (55).
-            forward_and_jacobian(chain, here, rotation, position, geometric)
-            task_kernels.jacobian(kind, rotation, geometric, jacobians[0])
-            task_kernels.coordinates(kind, rotation, position, present)
-            for j in range(horizon):
-                task_kernels.error(kind, nominal[row, j], poses[row] if one_step else present, residuals[j])
-            # The rest of the predicted path: y(k+j)_(i) and J(k+j)_(i) (34), (35).
-            first_square = dot(residuals[0], residuals[0])
-            square = first_square
-            for j in range(1, horizon):
-                if i == 0:
-                    square += dot(residuals[j], residuals[j])
-                else:
-                    if predicted:
-                        forward_and_jacobian(chain, path[j], rotation, position, geometric)
-                    else:
-                        forward(chain, path[j], rotation, position)
-                    task_kernels.coordinates(kind, rotation, position, coordinates)
-                    task_kernels.error(kind, nominal[row, j], coordinates, error)
-                    square += dot(error, error)
-                if predicted and i > 0:
-                    task_kernels.jacobian(kind, rotation, geometric, jacobians[j])
-                else:
-                    for a in range(size):
-                        for k in range(n):
-                            jacobians[j, a, k] = jacobians[0, a, k]
-            norm = np.sqrt(square)
-            if i == 0:
-                first = first_square
-            if not np.isfinite(norm):
-                status[row] = DIVERGED
-                break
-            if (norm if whole_horizon else np.sqrt(first_square)) <= tolerance and not one_step:  # (40)
-                status[row] = CONVERGED
-                break
-            if i == most:
-                break
-            condition = 1.0
-            if rule.condition_bounds.shape[0] > 0:
-                for j in range(horizon if predicted and i > 0 else 1):
-                    condition = max(condition, condition_number(jacobians[j], rank, scratch))
-            damping[row] = damping_now(rule, norm, condition, damping[row])  # (37)
-            _difference(residuals, differences)
-            solved = damped_horizon_step(jacobians, differences, damping[row], blocks, steps)  # (36)
-            if solved < horizon:
-                pseudoinverse_rows(jacobians, differences, RANK_TOLERANCE, rank, steps, lost)  # (38)
-                if lost.any():
-                    status[row] = DEFICIENT
-            damping[row] = damping_next(rule, damping[row], norm, error_before[row])  # (44)
-            error_before[row] = norm
-            _apply(steps, path, here)
-            i += 1
-            if one_step:
-                if status[row] == LIMIT:
-                    status[row] = APPLIED
-                break
-        iterations[row] = i
-        if not one_step and first_square > first:
-            stop_run_away(here, start, longest, status[row : row + 1])
-        finish(dt, rule, row, start, status[row], memory, here)
-
-
-@kernel
-def _difference(residuals, out):
-    """D of :mod:`block_tridiagonal`: shapes (n, e)."""
-    for j in range(residuals.shape[0]):
-        for a in range(residuals.shape[1]):
-            out[j, a] = residuals[j, a] - (residuals[j - 1, a] if j > 0 else 0.0)
-
-
-@inner
-def _apply(steps, path, here):
-    """The predicted path (56), the first point of which is the next iterate (57), (41)."""
-    for k in range(here.shape[0]):
-        shifted = here[k]
-        for j in range(steps.shape[0]):
-            shifted += steps[j, k]
-            path[j, k] = shifted
-        here[k] = path[0, k]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -181,12 +53,13 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
     stop: str = parameter("horizon", choice, available=("horizon", "first_point"))
 
     name: ClassVar[str] = "mfapc"
-    step = mfapc_step
 
     @property
     def preview(self) -> int:
         """The n points that lie ahead."""
         return self.horizon
 
-    def _horizon(self) -> tuple[int, bool, bool]:
-        return self.horizon, self.jacobians == "predicted", self.stop == "horizon"
+    def numbers(self) -> IterationNumbers:
+        """See :meth:`CompiledPolicy.numbers`."""
+        predicted, whole = self.jacobians == "predicted", self.stop == "horizon"
+        return super().numbers()._replace(horizon=self.horizon, predicted=predicted, whole_horizon=whole)

@@ -25,34 +25,24 @@ from ikgym.validation import FloatArray
 WHOLE_POSES = ("pose", "matrix")
 
 
-class Target(NamedTuple):
-    """Pose of the model at the end of the step.
-
-    It is the model's present pose, moved as the tool has to move from its measured pose to the reference.
-
-    Attributes:
-        rotation: Of the tool; the task leaves it free to stay as it is. Shape (3, 3).
-        position: In [m]. Shape (3,).
-    """
-
-    rotation: FloatArray
-    position: FloatArray
-
-
 class Seen(NamedTuple):
     """Observation of one arm for a solver.
+
+    The target is the model's present pose, moved as the tool has to move from its measured pose to the reference.
 
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (n,).
         start: Joint coordinates at the start of the episode. Shape (n,).
-        target: Where the model's tool is to be.
+        rotation: Of the model's tool at the end of the step; what the task leaves free stays as it is. Shape (3, 3).
+        position: Of the model's tool at the end of the step, in [m]. Shape (3,).
     """
 
     q: FloatArray
     qdot: FloatArray
     start: FloatArray
-    target: Target
+    rotation: FloatArray
+    position: FloatArray
 
 
 class StartMemory(NamedTuple):
@@ -80,7 +70,7 @@ class Rival(SolverPolicy, abc.ABC):
 
     The target leads from the measured pose to the reference pose of the next step, which holds the motion of the
     reference already: nothing is to be fed forward besides. Packages work out poses from the model, so the target is
-    corrected by the difference of the model's pose from the measured one, see :class:`Target`. Where a solver finds no
+    corrected by the difference of the model's pose from the measured one. Where a solver finds no
     joint velocities the arm is stopped for this step, and the status is ``diverged``.
 
     Args:
@@ -151,22 +141,14 @@ class Rival(SolverPolicy, abc.ABC):
         return Solution(qdot, kept, status, np.ones(len(start), dtype=np.int64))
 
     def seen(self, q: FloatArray, qdot: FloatArray, start: FloatArray, pose: FloatArray, nominal: FloatArray) -> Seen:
-        """The observation of one arm for a solver.
-
-        Args:
-            q: See :class:`Seen`, as `qdot` and `start`.
-            qdot: Likewise.
-            start: Likewise.
-            pose: Measured task coordinates. Shape (m,).
-            nominal: Reference task coordinates of the next step. Shape (m,).
-        """
+        """The observation of one arm, from its measured task coordinates and those of the next step; shapes (m,)."""
         rotation, position = np.empty((3, 3)), np.empty(3)
         forward(self.problem.model.chain, q, rotation, position)
         if self.problem.task.name in WHOLE_POSES:
             rotation = nominal[:9].reshape(3, 3) @ pose[:9].reshape(3, 3).T @ rotation
         elif self.problem.task.name == "axis":
             rotation = turn(pose[:3], nominal[:3]) @ rotation
-        return Seen(q, qdot, start, Target(rotation, position + (nominal[-3:] - pose[-3:])))
+        return Seen(q, qdot, start, rotation, position + (nominal[-3:] - pose[-3:]))
 
     def _step(self) -> Step:
         made = _made.__dict__.setdefault("steps", weakref.WeakKeyDictionary())

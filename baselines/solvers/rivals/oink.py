@@ -49,7 +49,8 @@ class Roboplan(TaskProgram):
         core, kinematics = self.imported("roboplan.core"), self.imported()
         solids, dt, n = solids_of(self.problem), self.problem.dt, self.model.joints
         scene = self._scene(core, solids)
-        settings = self._settings(kinematics)
+        settings = kinematics.OinkSettings()
+        settings.eps_abs, settings.max_iter, settings.warm_start = self.tolerance, self.iterations, False
         oink = kinematics.Oink(scene, settings)
         pose, moved = np.eye(4, order="F"), np.zeros(n)
         frame, *posture = tasks = self._tasks(core, kinematics, oink, scene)
@@ -59,7 +60,7 @@ class Roboplan(TaskProgram):
         barriers = self._barriers(kinematics, oink, scene, solids)
 
         def step(seen: Seen) -> FloatArray | None:
-            pose[:3, :3], pose[:3, 3] = seen.target
+            pose[:3, :3], pose[:3, 3] = seen.rotation, seen.position
             frame.setTargetFrameTransform(pose)
             for task in posture:
                 task.setTargetConfiguration(seen.start)
@@ -80,12 +81,6 @@ class Roboplan(TaskProgram):
         scene.setCollisions(list(itertools.combinations(names, 2)), False)
         scene.setCollisions([(names[i], names[j]) for i, j in solids.pairs], True)
         return scene
-
-    def _settings(self, kinematics: Any) -> Any:
-        settings = kinematics.OinkSettings()
-        settings.eps_abs, settings.max_iter = self.tolerance, self.iterations
-        settings.warm_start = False
-        return settings
 
     def _tasks(self, core: Any, kinematics: Any, oink: Any, scene: Any) -> list[Any]:
         """The frame task, then the posture task if there is one. Their costs are factors of squared errors."""

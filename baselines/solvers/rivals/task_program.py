@@ -125,15 +125,16 @@ class Pink(SolverProgram):
         frame = pink.tasks.FrameTask(TIP, *self.frame_costs, lm_damping=self.lm_damping, gain=self.gain)
         posture = [pink.tasks.PostureTask(self.posture_cost, gain=self.share)] if self.posture_cost else []
         tasks = [frame, *posture]
+        most = np.array(self.problem.model.acceleration_limit)
+        acceleration = [pink.limits.AccelerationLimit(model, most)] if np.isfinite(most).all() else []
         limits = [pink.limits.ConfigurationLimit(model, self.limit_gain), pink.limits.VelocityLimit(model)]
-        acceleration = self._acceleration(pink, model)
         limits += acceleration
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping, "safety_break": False}
         options["barriers"] = self._barriers(pink, solids)
 
         def step(seen: Seen) -> FloatArray | None:
             configuration.update(seen.q)
-            frame.set_target(pinocchio.SE3(*seen.target))
+            frame.set_target(pinocchio.SE3(seen.rotation, seen.position))
             for task in posture:
                 task.set_target(seen.start)
             for limit in acceleration:
@@ -145,10 +146,6 @@ class Pink(SolverProgram):
             return found
 
         return step
-
-    def _acceleration(self, pink: Any, model: Any) -> list[Any]:
-        limit = np.array(self.problem.model.acceleration_limit)
-        return [pink.limits.AccelerationLimit(model, limit)] if np.isfinite(limit).all() else []
 
     def _barriers(self, pink: Any, solids: Solids) -> list[Any]:
         options = {"safe_displacement_gain": self.safe_displacement_gain, "d_min": self.clearance}
@@ -193,7 +190,7 @@ class Mink(SolverProgram):
 
         def step(seen: Seen) -> FloatArray | None:
             configuration.update(seen.q)
-            pose[:3, :3], pose[:3, 3] = seen.target
+            pose[:3, :3], pose[:3, 3] = seen.rotation, seen.position
             for task in posture:
                 task.set_target(seen.start)
             frame.set_target(mink.SE3.from_matrix(pose))

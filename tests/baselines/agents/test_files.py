@@ -13,10 +13,12 @@ from baselines.agents.files import load_agent, save_agent
 from baselines.agents.track import Track
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
+from baselines.policy import Problem
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.random_agents import network, random_agent
 
 SCENARIO = ikgym.scenarios.get("varga7-pose-random")
+SKEW = Problem.of(ikgym.scenarios.get("varga7-random"))
 KINDS = (Bilinear, Track)
 AGENTS = {
     "bilinear": random_agent(SCENARIO, processing=Bilinear((1, 5, 20))),
@@ -119,15 +121,20 @@ def test_no_file(tmp_path):
             baselines.make("agent", SCENARIO, path=f"{tmp_path}/{name}")
 
 
-def test_processings_are_checked():
-    with pytest.raises(InvalidInputError, match="share: expected"):
-        Track((0.1,), 0.0)
-    for ahead in ((), (0.0, 0.1), (0.2, 0.1), ("a",), 0.1):
-        with pytest.raises(InvalidInputError, match="ahead: expected"):
-            Track(ahead)
-    with pytest.raises(InvalidInputError, match="offsets: expected at least two"):
-        Bilinear((1,))
-    with pytest.raises(InvalidInputError, match="damping: expected it together with predicted rates"):
-        Bilinear.from_json({"damping": 1e-2})  # of a version that knew other joint rates
-    with pytest.raises(UnknownNameError, match="no activation 'relo'"):
-        network((2, 2), "relo")
+#: What a processing or a network refuses.
+REFUSED = [
+    (lambda: Track((0.1,), 0.0), "share: expected"),
+    *((lambda ahead=ahead: Track(ahead), "ahead: expected") for ahead in ((), (0.0, 0.1), (0.2, 0.1), ("a",), 0.1)),
+    *((lambda steps=steps: Bilinear(steps), "offsets: expected") for steps in ((1,), (2, 5), (1, 5, 5), (1, 2.5))),
+    *((lambda number=number: Bilinear((1, 5), number), "damping: ") for number in (0.0, float("nan"), "much")),
+    (lambda: Bilinear((1, 5), 1e-2).outputs(SKEW), "damping: expected None for skew coordinates"),
+    # Of a version that knew other joint rates.
+    (lambda: Bilinear.from_json({"damping": 1e-2}), "damping: expected it together with predicted rates"),
+    (lambda: network((2, 2), "relo"), "no activation 'relo'"),
+]
+
+
+def test_processings_and_networks_are_checked():
+    for make, words in REFUSED:
+        with pytest.raises((InvalidInputError, UnknownNameError), match=words):
+            make()

@@ -3,25 +3,33 @@
 import numpy as np
 import pytest
 
-from baselines.solvers.linear_algebra import orthogonal_columns
+from baselines.solvers.linear_algebra import ldl, ldl_scaled_inverse, ldl_solve, orthogonal_columns
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 
 @pytest.mark.parametrize("m", [1, 3, 6, 12])
-def test_cholesky(m):
+def test_factors_of_positive_definite_matrices(m):
     rng = np.random.default_rng(m)
-    half = rng.normal(size=(m, m + 2))
-    matrix, rhs = half @ half.T + 0.1 * np.eye(m), rng.normal(size=m)
-    factor, x = matrix.copy(), rhs.copy()
+    half, rhs = rng.normal(size=(m, m + 2)), rng.normal(size=m)
+    matrix = half @ half.T + 0.1 * np.eye(m)
+    factor, x, factor_ldl, y = matrix.copy(), rhs.copy(), np.tril(matrix), rhs.copy()
     assert cholesky(factor)
     cholesky_solve(factor, x)
     np.testing.assert_allclose(np.tril(factor), np.linalg.cholesky(matrix), rtol=1e-12)
     np.testing.assert_allclose(x, np.linalg.solve(matrix, rhs), rtol=1e-9)
+    assert ldl(factor_ldl)
+    lower = np.tril(factor_ldl, -1) + np.eye(m)
+    np.testing.assert_allclose(lower / np.diag(factor_ldl) @ lower.T, matrix, atol=1e-12)
+    ldl_solve(factor_ldl, y)
+    np.testing.assert_allclose(matrix @ y, rhs, atol=1e-12)
+    ldl_scaled_inverse(factor_ldl, 3.0, factor)
+    np.testing.assert_allclose(factor, 3.0 * np.linalg.inv(matrix), atol=1e-11)
 
 
-@pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
-def test_cholesky_of_what_is_not_positive_definite(matrix):
-    assert not cholesky(np.array(matrix))
+@pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
+def test_what_is_not_positive_definite_is_refused(matrix):
+    assert not ldl(np.array(matrix))
+    assert matrix[0] == [1.0, 1.0] or not cholesky(np.array(matrix))
 
 
 def check(matrix):

@@ -9,7 +9,6 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.episodes import rollouts
 from baselines.policy import Batch, Problem
 from ikgym import arms, scenarios, tasks
-from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import write_agent
 
 OFFSETS = (1, 5, 20)
@@ -71,19 +70,6 @@ def test_without_a_frame_that_turns_joint_1_is_seen(arm, task):
     assert np.abs(features(problem, there)[:, :2] - features(problem, here)[:, :2]).max() > 0.1
 
 
-@pytest.mark.parametrize(("arm", "task", "wanted"), [
-    ("varga7", "pose", 11 + 2 * 6 + 2), ("varga7", "skew", 13 + 2 * 6 + 2), ("varga7", "position", 11 + 2 * 3 + 2),
-    ("tiago", "axis", 15 + 2 * 6 + 2), ("planar2", "matrix", 2 + 2 * 6 + 2),
-])  # fmt: skip
-def test_sizes(arm, task, wanted):
-    problem = problem_of(arm, task)
-    seen = features(problem, batch_of(problem))
-    assert seen.shape == (ROWS, wanted)
-    assert seen.dtype == np.float32
-    assert Bilinear(OFFSETS).size(problem) == wanted
-    assert Bilinear(OFFSETS).outputs(problem) == problem.model.joints * (4 if task == "position" else 7)
-
-
 def test_features_in_numbers():
     """Against the table of the docstring, where twists are plain differences."""
     problem = problem_of(task="position")
@@ -130,8 +116,9 @@ def test_the_inverse_jacobian_removes_the_error(task):
     assert np.abs(after).max() < 0.02 * np.abs(before).max()
 
 
-@pytest.mark.parametrize("arm", ["varga7", "tiago"])
-@pytest.mark.parametrize("task", tasks.names())
+@pytest.mark.parametrize(
+    ("arm", "task"), [("varga7", "pose"), ("varga7", "skew"), ("varga7", "position"), ("tiago", "axis")]
+)
 def test_gradients_of_features(arm, task):
     problem = problem_of(arm, task)
     batch, chain, offsets = batch_of(problem), problem.model.chain, np.array(OFFSETS)
@@ -159,9 +146,3 @@ def test_agents_play_alike_where_skew_coordinates_are_shown(tmp_path):
     file = write_agent(tmp_path / "a.safetensors", scenario, processing=Bilinear(OFFSETS))
     (episode,), (shown,) = (rollouts(on, baselines.make("agent", on, path=file), [3]) for on in (scenario, skew))
     np.testing.assert_allclose(shown.qdot, episode.qdot, rtol=1e-3, atol=1e-5)
-
-
-@pytest.mark.parametrize("offsets", [(1,), (2, 5), (1, 5, 5), (1, 2.5)])
-def test_bad_offsets(offsets):
-    with pytest.raises(InvalidInputError, match="offsets"):
-        Bilinear(offsets)

@@ -6,7 +6,6 @@ import pytest
 from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.network import Network
-from ikgym.exceptions import InvalidInputError
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, outputs, problem_of, qdot
 from tests.baselines.random_agents import nothing_held
 
@@ -92,11 +91,3 @@ def test_an_untrained_network_is_damped_least_squares():
     before = problem.task.error(batch.nominal[:, 0], batch.pose)
     assert np.median(np.abs(after).max(1) / np.abs(before).max(1)) < 0.1
     assert not qdot(problem, batch, np.zeros_like(outputs(problem))).any()
-
-
-def test_refused():
-    for damping in (0.0, float("nan"), "much"):
-        with pytest.raises(InvalidInputError, match="damping"):
-            Bilinear(OFFSETS, damping)
-    with pytest.raises(InvalidInputError, match="damping: expected None for skew coordinates"):
-        DAMPED.outputs(problem_of("varga7", "skew"))

@@ -1,4 +1,4 @@
-"""A Panda that is not that of the data sheet, and what its sensors show."""
+"""A Panda that is not that of the data sheet, what its sensors show, and what is learnt of it."""
 
 import numpy as np
 
@@ -35,11 +35,11 @@ def path(seed, steps):
     return PANDA.home + 0.5 * np.sin(3.0 * time * rng.uniform(0.5, 1.5, 7)) * rng.choice([-1.0, 1.0], 7)
 
 
-def observed(on, arm, zeros, q, target=None, **extras):
+def observed(on, arm, zeros, q, target=None):
     """What one arm shows; of the pose what the perturbed arm has."""
     pose = on.task.coordinates(*arm.forward(q + zeros))
     nominal = pose if target is None else target
-    return {"q": q, "qdot": np.zeros(7), "pose": pose, "nominal": nominal[None], "remaining": np.ones(1), **extras}
+    return {"q": q, "qdot": np.zeros_like(q), "pose": pose, "nominal": nominal[None], "remaining": np.ones(1)}
 
 
 def noisy(on, observation, rng, noise):
@@ -48,3 +48,36 @@ def noisy(on, observation, rng, noise):
     vector = noise * rng.standard_normal(3)
     turn = rodrigues(vector / np.linalg.norm(vector), np.linalg.norm(vector))
     return observation | {"pose": on.task.coordinates(turn @ rotation, position + noise * rng.standard_normal(3))}
+
+
+def learnt(policy, arm, zeros, q, noise=0.0, state=None, start=None, changed=(0.0, 10**9)):
+    """The state after some postures, with a change of the joint zeros from one of them on."""
+    on, rng = scenario(), np.random.default_rng(1)
+    change, at = changed
+    for k, posture in enumerate(q):
+        seen = observed(on, arm, zeros + np.asarray(change) * (k >= at), posture)
+        _, state = policy.predict(noisy(on, seen, rng, noise) if noise else seen, state, start)
+        start = None
+    return state
+
+
+def memory(policy, state):
+    """The memory of a wrapper, without that of its base policy."""
+    return policy.split(policy.memory_of(state))[0]
+
+
+def deviation_of(policy, state, q):
+    """What a policy takes the deviation to be at a posture."""
+    own = memory(policy, state)
+    if hasattr(own, "deviation"):
+        return own.deviation[0]
+    out, batch = np.empty((1, 6)), type("Shown", (), {"q": q[None], "pose": np.zeros((1, 12))})
+    measured = type("Measured", (), {name: np.zeros(1, np.bool_) for name in ("new", "first")} | {"q": q[None]})
+    policy.learn(batch, measured, own, out, np.empty((1, 6)))
+    return out[0]
+
+
+def true_deviation(arm, zeros, q):
+    """From the data sheet's pose to the arm's. Shape (6,)."""
+    task = ikgym.tasks.get("pose")
+    return task.error(task.coordinates(*arm.forward(q + zeros)), task.coordinates(*PANDA.forward(q)))

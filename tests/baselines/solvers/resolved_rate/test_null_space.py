@@ -16,11 +16,10 @@ def with_limits(scenario):
     return scenario.replace(arm=arm, model=arm)
 
 
-@pytest.mark.parametrize("damping", [0.0, 1e-3])
 @pytest.mark.parametrize(
-    "aim", [{"objective": "posture", "posture": 0.7}, {"objective": "joint_centring"}], ids=lambda aim: aim["objective"]
+    ("aim", "damping"), [({"objective": "posture", "posture": 0.7}, 0.0), ({"objective": "joint_centring"}, 1e-3)]
 )
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q7q8", "zhang6-lspb", "faitli3-regular"])
+@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q7q8", "zhang6-lspb"])
 def test_changes_no_task_velocity(name, aim, damping):
     scenario = with_limits(ikgym.scenarios.get(name))
     gain = 1.0 / scenario.dt
@@ -56,43 +55,16 @@ def test_first_part_is_moore_penrose_or_dls():
         np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.parametrize("objective", ["posture", "joint_centring"])
-def test_gets_nearer_to_its_aim_while_the_task_stands_still(objective):
-    scenario = with_limits(ikgym.scenarios.get("varga7-fast"))
-    policy = baselines.make("null_space", scenario, objective=objective, posture=0.5, secondary_gain=20.0, damping=0.0)
-    here = np.array([0.3, -0.6, 0.4, 0.8, -0.5, 0.7, 0.2])
-    middle = 0.5 * (scenario.model.lower + scenario.model.upper)
-    weights = (np.min(scenario.model.upper - scenario.model.lower) / (scenario.model.upper - scenario.model.lower)) ** 2
-    merit = {
-        "posture": lambda q: -np.sum((q - 0.5) ** 2),
-        "joint_centring": lambda q: -np.sum(weights * (q - middle) ** 2),
-    }[objective]
-    target = scenario.task.coordinates(*scenario.model.forward(here))
-    q, state, merits = here.copy(), None, []
-    for _ in range(200):
-        observation = {
-            "q": q,
-            "qdot": np.zeros(7),
-            "pose": scenario.task.coordinates(*scenario.model.forward(q)),
-            "nominal": target[None],
-            "remaining": np.ones(1),
-        }
-        action, state = policy.predict(observation, state)
-        q = q + scenario.dt * action * scenario.velocity_limit
-        merits.append(merit(q))
-    assert (np.diff(merits) > -1e-9).all()
-    assert merits[-1] > merits[0]
-    reached = scenario.task.coordinates(*scenario.model.forward(q))
-    np.testing.assert_allclose(reached, target, atol=1e-4)
-
-
-def test_centring_leaves_joints_without_limits_alone():
+def test_centring_leaves_joints_without_limits_alone_and_a_posture_none():
     scenario = ikgym.scenarios.get("varga7-fast")
     lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
     lower[[1, 4]], upper[[1, 4]], upper[2] = [-1.0, 0.0], [3.0, 2.0], 1.0
     arm = dataclasses.replace(scenario.arm, lower=lower, upper=upper)
     policy = baselines.make("null_space", scenario.replace(arm=arm, model=arm), objective="joint_centring")
-    np.testing.assert_allclose(objective_gradient(policy, np.full((1, 7), 0.5))[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
+    q = np.full((1, 7), 0.5)
+    np.testing.assert_allclose(objective_gradient(policy, q)[0], [0, 0.5 * 0.25, 0, 0, 0.5, 0, 0])
+    posture = baselines.make("null_space", scenario, objective="posture", posture=0.7)
+    np.testing.assert_allclose(objective_gradient(posture, q)[0], 0.2)
 
 
 def test_by_default_joints_with_limits_are_centred_and_others_go_to_0():

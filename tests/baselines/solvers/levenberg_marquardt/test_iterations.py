@@ -1,0 +1,235 @@
+"""MFAC and MFAPC against (11)-(17) and (34)-(41) in plain NumPy, their statuses and identities."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import ikgym
+from baselines.policy import Batch
+from baselines.status import Status
+from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed as dense
+
+RULES = {
+    "constant": {"damping": 0.05},
+    "error_ratio": {"damping": 0.5, "growth": 3.0, "decay": 1.5},
+    "threshold": {"damping": 0.5, "growth": 1.2, "decay": 2.0, "threshold": 0.1},
+    "table": {
+        "error_bounds": (0.01, 0.1),
+        "condition_bounds": (9.0,),
+        "dampings": ((1e-4, 0.1), (0.2, 0.3), (0.4, 0.5)),
+    },
+    "condition": {"condition_bounds": (9.0, 30.0), "dampings": (1e-3, 0.02, 0.3)},
+    "sugihara": {"weight": 2.0, "damping": 0.01},
+    "chan": {"weight": 2.0},
+}
+HELIX = ikgym.scenarios.get("zhang3-helix")
+
+
+def batch_of(scenario, q, nominal, pose=None):
+    """Observations of rows; nominal has shape (B, p, m)."""
+    pose = scenario.task.coordinates(*scenario.model.forward(q)) if pose is None else pose
+    return Batch(q, np.zeros_like(q), pose, np.ascontiguousarray(nominal), np.ones((len(q), 1)))
+
+
+def problems(scenario, points, rows=4, far=0.1, seed=0):
+    """Rows with nominal points somewhat off."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-1.0, 1.0, (rows, scenario.joints))
+    away = q[:, None] + far * rng.uniform(-1, 1, (rows, 1, scenario.joints)) * np.arange(1, points + 1)[:, None]
+    return batch_of(scenario, q, scenario.task.coordinates(*scenario.model.forward(away)))
+
+
+def solve(name, scenario, batch, **numbers):
+    policy = baselines.make(name, scenario, **numbers)
+    solution = policy.solve(batch, policy.memory(len(batch.q)))
+    assert np.isfinite(solution.qdot).all()
+    return solution
+
+
+def lambda_now(rule, numbers, error, condition, stepped):
+    if rule == "constant":
+        return numbers["damping"]
+    if rule == "table":
+        row = sum(error >= b for b in numbers["error_bounds"])
+        return numbers["dampings"][row][sum(condition >= b for b in numbers["condition_bounds"])]
+    if rule == "condition":
+        return numbers["dampings"][sum(condition >= b for b in numbers["condition_bounds"])]
+    if rule in ("sugihara", "chan"):
+        return numbers["weight"] * error**2 / 2 + numbers.get("damping", 0.0)
+    return stepped
+
+
+def lambda_next(rule, numbers, damping, error, before):
+    if rule not in ("error_ratio", "threshold"):
+        return damping
+    rises = error / before > 1 if rule == "error_ratio" else error > numbers["threshold"]
+    return damping * numbers["growth"] if rises else damping / numbers["decay"]
+
+
+def task_jacobian(scenario, q):
+    rotation, _, geometric = scenario.model.forward_and_jacobian(q)
+    return scenario.task.jacobian(rotation, geometric)
+
+
+def condition_of(jacobian):
+    sigma = np.linalg.svd(jacobian, compute_uv=False)
+    return sigma[0] / sigma[min(*jacobian.shape, 6) - 1]
+
+
+def printed(scenario, q, nominal, rule, numbers, *, jacobians, stop, tolerance, most):
+    """(34)-(41) with the dense (36) and (56); with one point they are (11)-(17)."""
+    task, model, n = scenario.task, scenario.model, len(nominal)
+    path, before = [q] * n, None
+    damping = numbers.get("damping", 0.0)
+    for i in range(most + 1):
+        poses = [task.coordinates(*model.forward(p)) for p in path]  # (34)
+        given = [task_jacobian(scenario, p if jacobians == "predicted" else path[0]) for p in path]  # (35)
+        errors = [np.linalg.norm(task.error(nominal[j], poses[j])) for j in range(n)]
+        error = np.linalg.norm(errors)
+        if (error if stop == "horizon" else errors[0]) <= tolerance or i == most:  # (16), (40)
+            return path[0], i
+        damping = lambda_now(rule, numbers, error, max(map(condition_of, given)), damping)
+        residuals = np.stack([task.error(nominal[j], poses[0]) for j in range(n)])
+        path = list(path[0] + np.cumsum(dense(np.stack(given), residuals, damping), axis=0))  # (36), (56), (57)
+        damping = lambda_next(rule, numbers, damping, error, error if before is None else before)
+        before = error
+    raise AssertionError
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize(
+    ("name", "n", "jacobians", "stop", "far"),
+    [
+        ("varga7-fast", 1, "predicted", "horizon", 0.1),
+        ("zhang3-helix", 1, "predicted", "horizon", 0.1),
+        ("khan8-q1", 1, "predicted", "horizon", 0.1),
+        ("varga7-fast", 2, "predicted", "horizon", 0.02),
+        ("zhang3-helix", 3, "constant", "horizon", 0.02),
+        ("zhang6-lspb", 3, "predicted", "first_point", 0.02),
+        ("khan8-q1", 5, "predicted", "horizon", 0.02),
+    ],
+)
+def test_follows_the_printed_iteration(name, n, jacobians, stop, far, rule):
+    """MFAC where there is one point."""
+    scenario = ikgym.scenarios.get(name)
+    batch = problems(scenario, n, far=far, rows=2)
+    ahead = {"jacobians": jacobians, "stop": stop}
+    policy, given = ("mfac", {}) if n == 1 else ("mfapc", {"horizon": n, **ahead})
+    for most in (1, 2, 6, 12)[: 4 if n == 1 else 3]:
+        solution = solve(policy, scenario, batch, rule=rule, iterations=most, tolerance=1e-3, **given, **RULES[rule])
+        for row, q in enumerate(batch.q):
+            numbers = {**ahead, "most": most, "tolerance": 1e-3}
+            wanted, made = printed(scenario, q, batch.nominal[row], rule, RULES[rule], **numbers)
+            np.testing.assert_allclose(q + scenario.dt * solution.qdot[row], wanted, atol=1e-9)
+            assert solution.iterations[row] == made
+
+
+@pytest.mark.parametrize(("name", "n"), [("varga7-fast", 2), ("zhang6-lspb", 7)])
+def test_without_damping_the_first_shift_of_mfapc_is_that_of_mfac(name, n):
+    """(38): whatever lies behind the first point."""
+    scenario = ikgym.scenarios.get(name)
+    batch = problems(scenario, n, far=0.05)
+    numbers = {"rule": "constant", "damping": 0.0, "iterations": 4}
+    one = solve("mfac", scenario, batch, **numbers)
+    other = solve("mfapc", scenario, batch, horizon=n, stop="first_point", **numbers)
+    np.testing.assert_array_equal(one.qdot, other.qdot)
+    np.testing.assert_array_equal(one.iterations, other.iterations)
+
+
+def sliding_arm(n):
+    """Joints that slide: F is linear and J constant; one of them slides along x."""
+    axes = np.eye(3)[:1] if n == 1 else np.random.default_rng(3).normal(size=(n, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    arm = ikgym.Arm("slider", offsets=np.zeros((n, 3)), axes=axes, prismatic=(True,) * n)
+    start, limit = np.zeros(n), np.full(n, 10.0)
+    return HELIX.replace(arm=arm, model=arm, start=start, initial_pose=None, velocity_limit=limit)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.5])
+def test_error_on_a_ramp(damping):
+    """(10): one step a period leaves U diag(λ/σ²) Uᵀ v, for a ramp of velocity v."""
+    scenario = sliding_arm(4)
+    policy = baselines.make("mfac", scenario, rule="constant", damping=damping, one_step=True)
+    velocity, q = np.array([0.02, -0.05, 0.03]), np.zeros(4)
+    first = scenario.model.forward(q)[1]
+    for k in range(400):
+        target = first + (k + 1) * velocity
+        solution = policy.solve(batch_of(scenario, q[None], target[None, None]), policy.memory(1))
+        q = q + scenario.dt * solution.qdot[0]
+    u, sigma, _ = np.linalg.svd(scenario.model.jacobian(q)[:3])
+    wanted = u @ np.diag(damping / sigma**2) @ u.T @ velocity
+    np.testing.assert_allclose(target - scenario.model.forward(q)[1], wanted, atol=1e-13)
+
+
+def status_of(name, nominal, q=(0.3, 0.4, 0.5), scenario=HELIX, **numbers):
+    """Status, iterations, and joint velocities of one arm that is shown one point, twice for a horizon."""
+    batch = batch_of(scenario, np.array([q]), np.tile(np.array(nominal, dtype=float), (1, 2, 1)))
+    solution = solve(name, scenario, batch, **numbers)
+    return solution.status[0], solution.iterations[0], solution.qdot, solution.memory
+
+
+OUT_OF_REACH = [30.0, 0.0, 5.0]
+
+
+def test_statuses_out_of_reach():
+    """One step takes the formula's word for it."""
+    assert status_of("mfac", OUT_OF_REACH, rule="sugihara")[:2] == (Status.ITERATION_LIMIT, 500)
+    assert status_of("mfac", OUT_OF_REACH, one_step=True)[:2] == (Status.APPLIED, 1)
+
+
+@pytest.mark.parametrize("name", ["mfac", "mfapc"])
+def test_rank_that_is_lost_is_said_unless_it_is_damped(name):
+    """Stretched straight up, no joint moves the tool along z, and λ = 0 leaves that direction out."""
+    for damping, iterated, one_step in (
+        (0.0, Status.RANK_DEFICIENT, Status.RANK_DEFICIENT),
+        (1e-20, Status.RANK_DEFICIENT, Status.RANK_DEFICIENT),
+        (0.1, Status.ITERATION_LIMIT, Status.APPLIED),
+    ):
+        numbers = {"rule": "constant", "iterations": 3, "damping": damping}
+        stretched = name, [0.0, 0.0, 18.0], (0.0, 0.0, 0.0)
+        assert status_of(*stretched, **numbers)[0] == iterated
+        assert status_of(*stretched, one_step=True, **numbers)[0] == one_step
+
+
+def test_running_away_is_not_converging():
+    """Undamped beside a stretched elbow, one step is turns long; the arm stays, and the memory is cleared."""
+    q = np.array([0.0, 0.3, 1e-5])
+    inwards = 0.99 * ikgym.arms.get("zhang3").forward(q)[1] + [0, 0, 0.05]
+    numbers = {"rule": "threshold", "damping": 0.0, "threshold": 1e3, "carry": True}
+    status, _, qdot, memory = status_of("mfac", inwards, q, iterations=1, **numbers)
+    assert status == Status.DIVERGED
+    np.testing.assert_array_equal(qdot, 0.0)
+    assert memory[1][0] == np.inf
+
+
+def test_iterates_that_are_no_numbers():
+    far = [1e200] * 3, np.zeros(4), sliding_arm(4)
+    status, _, qdot, _ = status_of("mfac", *far, rule="constant", damping=0.0)
+    assert status == Status.DIVERGED
+    np.testing.assert_array_equal(qdot, 0.0)
+
+
+@pytest.mark.parametrize("name", ["mfac", "mfapc"])
+def test_one_step_uses_the_measured_pose_and_the_iteration_the_model(name):
+    q, wrong = np.array([[0.3, 0.4, 0.5]]), np.array([[1.0, 2.0, 3.0]])
+    nominal = np.array([[[5.0, 1.0, 6.0], [5.5, 1.0, 6.0]]])
+    ahead = 1 if name == "mfac" else 2
+    numbers = {"rule": "constant", "damping": 2.0}
+    solution = solve(name, HELIX, batch_of(HELIX, q, nominal, wrong), one_step=True, **numbers)
+    wanted = dense(np.stack([task_jacobian(HELIX, q[0])] * ahead), (nominal[0] - wrong[0])[:ahead], 2.0)[0]
+    np.testing.assert_allclose(solution.qdot[0], wanted, atol=1e-12)
+    answers = [solve(name, HELIX, batch_of(HELIX, q, nominal, p), **numbers).qdot for p in (None, wrong)]
+    np.testing.assert_array_equal(*answers)
+
+
+@pytest.mark.parametrize("carry", [False, True])
+def test_carried_lambda_goes_on_and_a_new_episode_forgets_it(carry):
+    policy = baselines.make("mfac", "zhang6-lspb", rule="threshold", damping=1.0, carry=carry, one_step=True)
+    observation, _ = gym.make("RedundantIK-v0", scenario="zhang6-lspb", preview=1).reset()
+    state, dampings = None, []
+    for k in range(4):
+        _, state = policy.predict(observation, state, episode_start=np.array([k == 3]))
+        dampings.append(state[2][0])
+    wanted = [1.02**-1, 1.02**-2, 1.02**-3, 1.02**-1] if carry else [1.02**-1] * 4
+    assert dampings == pytest.approx(wanted, rel=1e-14)
