@@ -37,15 +37,11 @@ def driven(which, name, pose, **parameters):
 
 
 @pytest.mark.parametrize(
-    ("name", "parameters"),
-    [("dls", {}), ("rhc", {"horizon": 8, "stop_at_end": True})],
-)
-@pytest.mark.parametrize(
-    "pose",
+    ("name", "parameters", "pose"),
     [
-        lambda which, q: which.task.coordinates(*which.arm.forward(q)),
-        lambda which, q: which.arm.forward(q),
-        lambda which, q: None,
+        ("dls", {}, lambda which, q: which.task.coordinates(*which.arm.forward(q))),
+        ("dls", {}, lambda which, q: which.arm.forward(q)),
+        ("rhc", {"horizon": 8, "stop_at_end": True}, lambda which, q: None),
     ],
     ids=["coordinates", "rotation and position", "of the model"],
 )

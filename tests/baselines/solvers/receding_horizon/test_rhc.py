@@ -1,7 +1,6 @@
 """The receding horizon against IPOPT and gradient descent, its limits, and what it does along episodes."""
 
 import dataclasses
-import functools
 
 import gymnasium as gym
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.episodes import rollout
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
@@ -104,7 +104,7 @@ def check_against_ipopt(name, horizon, count, **parameters):
 
 @pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow"])
 def test_plans_are_as_cheap_as_ipopts(name):
-    check_against_ipopt(name, 10, 4)
+    check_against_ipopt(name, 10, 2)
 
 
 @pytest.mark.slow
@@ -144,7 +144,7 @@ def test_other_arms_and_tasks(name, horizon, count):
 def test_blocked_and_weighted_horizons(parameters):
     scenario = ikgym.scenarios.get("varga7-fast")
     policy = baselines.make("rhc", scenario, **parameters)
-    q, nominal = states_near(scenario, policy.preview, 3, 1e-2)
+    q, nominal = states_near(scenario, policy.preview, 2, 1e-2)
     costs, horizons, plans, state = planned(policy, q, nominal)
     assert set(policy.report(state).status) == {Status.CONVERGED}
     compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
@@ -204,7 +204,7 @@ def limited(name, speed=20.0, share=0.0):
 )
 def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
     policy = baselines.make("rhc", scenario, horizon=horizon)
-    q, nominal = states_near(scenario, horizon - 1, 12, far, seed=3)
+    q, nominal = states_near(scenario, horizon - 1, 8, far, seed=3)
     lower, upper = policy.problem.model.lower, policy.problem.model.upper
     q = np.clip(q, lower, upper)
     costs, horizons, plans, _ = planned(policy, q, nominal)
@@ -223,11 +223,10 @@ def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
         best = solver.solve(state, plan)
         compared += best.converged
         assert cost == pytest.approx(best.cost, rel=RELATIVE, abs=ABSOLUTE) or not best.converged
-    assert compared >= 6
+    assert compared >= 4
 
 
-@pytest.mark.parametrize("iterations", [None, 1])
-@pytest.mark.parametrize("share", [0.0, 0.1])
+@pytest.mark.parametrize(("iterations", "share"), [(None, 0.1), (1, 0.0)])
 def test_an_episode_stays_within_its_limits(iterations, share):
     scenario = limited("varga7-fast", speed=4.0, share=share).replace(steps=150)
     policy = baselines.make("rhc", scenario, horizon=8, iterations=iterations)
@@ -235,7 +234,6 @@ def test_an_episode_stays_within_its_limits(iterations, share):
     observation, _ = env.reset()
     state, lower, upper = None, scenario.arm.lower - 1e-6, scenario.arm.upper + 1e-6
     inside = np.all((observation["q"] >= lower) & (observation["q"] <= upper))
-    pressed = False
     for _ in range(150):
         action, state = policy.predict(observation, state)
         assert action in env.action_space
@@ -243,34 +241,19 @@ def test_an_episode_stays_within_its_limits(iterations, share):
         within = bool(np.all((observation["q"] >= lower) & (observation["q"] <= upper)))
         assert within or not inside  # the nominal start may lie outside
         inside = inside or within
-        pressed |= bool((abs(action) > 0.999).any())
     assert inside
-    assert pressed or share > 0.0
 
 
-@functools.cache
-def episode(name, policy="rhc", steps=3000, **parameters):
-    """Total cost, Newton steps and statuses of an episode."""
-    scenario = ikgym.scenarios.get(name).replace(steps=steps)
-    policy = baselines.make(policy, scenario, **parameters)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    observation, _ = env.reset()
-    total, state, made, statuses = 0.0, None, [], set()
-    for _ in range(steps):
-        action, state = policy.predict(observation, state)
-        observation, reward, *_ = env.step(action)
-        total -= float(reward)
-        made.append(int(policy.report(state).iterations[0]))
-        statuses.add(int(policy.report(state).status[0]))
-    return total, made, statuses
+def total(episode):
+    return float((episode.tracking_cost + episode.velocity_cost).sum())
 
 
 def test_one_newton_step_a_period_is_nearly_the_optimum():
-    converged, _, statuses = episode("varga7-fast", steps=800)
-    quick, made, _ = episode("varga7-fast", steps=800, iterations=1)
-    assert quick == pytest.approx(converged, rel=0.01)
-    assert statuses == {Status.CONVERGED}
-    assert set(made[1:]) == {1}
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=800)
+    whole, quick = (rollout(scenario, baselines.make("rhc", scenario, iterations=n), 0) for n in (None, 1))
+    assert total(quick) == pytest.approx(total(whole), rel=0.01)
+    assert set(whole.status) == {Status.CONVERGED}
+    assert set(quick.iterations[1:]) == {1}
 
 
 RESTARTED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
@@ -286,9 +269,7 @@ def pushed(policy):
         yield observe(policy.problem, q, ahead, remaining=60 - k), np.array([k == 0, k % 7 == 0, k == 11])
 
 
-@pytest.mark.parametrize(
-    "more", [{}, {"stop_at_end": True}, {"iterations": None}, {"start_steps": 4}, {"recovery_steps": 3}]
-)
+@pytest.mark.parametrize("more", [{"stop_at_end": True}, {"iterations": None}, {"start_steps": 4, "recovery_steps": 3}])
 def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(more):
     policy = baselines.make("rhc", "varga7-fast", **{**RESTARTED, **more})
     states, batched = [None] * 3, None
@@ -303,13 +284,13 @@ def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(mor
     assert (policy.report(batched).iterations > 1).all()  # restart candidates among them
 
 
-@pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
-def test_seeds(change, same):
+def test_seeds():
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=60)
     base = {"horizon": 200, "move_blocks": 16, "starts": 6, "start_steps": 0}
-    first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
-    episode.cache_clear()
-    assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
-    assert (first == second) == same
+    policies = [baselines.make("rhc_foresight", scenario, **base, seed=seed) for seed in (0, 0, 1)]
+    first, again, other = (rollout(scenario, policy, 0).q for policy in policies)
+    assert identical(first, again)
+    assert not identical(first, other)
 
 
 def test_nothing_finite_gives_a_nan():

@@ -31,9 +31,13 @@ def place(at=(1, 2, 4, 7), task="pose", braking=True, **changes):
     return here, path, newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
 
 
-@pytest.mark.parametrize("braking", [False, True])
-@pytest.mark.parametrize("at", [(1,), (3, 5, 6), (1, 2, 4, 7)])
-@pytest.mark.parametrize("task", ["pose", "position"])
+@pytest.mark.parametrize(
+    ("task", "at", "braking"),
+    [
+        *(("pose", (1,), True), ("pose", (3, 5, 6), False), ("pose", (1, 2, 4, 7), True)),
+        *(("position", (1,), False), ("position", (3, 5, 6), True), ("position", (1, 2, 4, 7), False)),
+    ],
+)
 def test_derivatives_against_central_differences(at, task, braking):
     problem, path, workspace = place(at, task, braking)
     model = workspace.model
@@ -59,7 +63,7 @@ def test_derivatives_against_central_differences(at, task, braking):
     np.testing.assert_allclose(wrong, 0.0, atol=(1e-5 if task == "position" else 1e-2) * abs(central).max())
 
 
-@pytest.mark.parametrize("at", [(1, 2, 3), (1, 2, 4, 7)])
+@pytest.mark.parametrize("at", [(1, 2, 4, 7)])
 def test_it_tends_to_the_cost_and_the_weighted_excess(at):
     """With μ to 0 what is left is the cost and w times all that is beyond a limit."""
     problem, path, workspace = place(at, braking=False)

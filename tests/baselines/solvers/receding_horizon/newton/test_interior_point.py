@@ -54,8 +54,7 @@ def test_golden_states_are_at_all_limits():
     assert (np.array([at_limit for *_, at_limit in GOLDEN[8:13]]) > 0).any(axis=0).all()
 
 
-@pytest.mark.parametrize("braking", [False, True])
-@pytest.mark.parametrize("at", [(1,), (2, 5), (1, 2, 4, 8, 15, 25)])
+@pytest.mark.parametrize(("at", "braking"), [((1,), True), ((2, 5), False), ((1, 2, 4, 8, 15, 25), True)])
 def test_optimum_between_uneven_knots_is_ipopts(at, braking):
     pytest.importorskip("casadi", reason="pip install ikgym[rivals]")
     from benchmarks.rivals.casadi_horizon import CasadiHorizon

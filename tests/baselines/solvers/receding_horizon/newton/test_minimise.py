@@ -39,8 +39,7 @@ def step_of(blocks, exact, damping):
     return newton_step(blocks, exact, damping, inverse, factor, step), step
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.7])
-@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize(("exact", "damping"), [(False, 0.0), (True, 0.7)])
 @pytest.mark.parametrize(("knots", "n"), [(1, 1), (2, 3), (30, 8)])
 def test_step_against_a_dense_solve(knots, n, exact, damping):
     blocks = random_blocks(knots, n, np.random.default_rng(knots))

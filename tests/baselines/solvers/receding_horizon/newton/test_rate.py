@@ -72,9 +72,8 @@ def test_derivatives_against_central_differences(at):
     np.testing.assert_allclose(whole(blocks), central, atol=1e-5 * abs(central).max())
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.7])
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize(("knots", "n"), [(1, 1), (1, 7), (2, 3), (3, 2), (5, 7), (30, 8)])
+@pytest.mark.parametrize(("exact", "damping"), [(False, 0.0), (True, 0.7)])
+@pytest.mark.parametrize(("knots", "n"), [(1, 7), (2, 3), (3, 2), (30, 8)])
 def test_step_against_a_dense_solve(knots, n, exact, damping):
     blocks = random_blocks(knots, n, np.random.default_rng(knots))
     blocks.far[:] = np.random.default_rng(0).uniform(-0.4, 0.4, (knots, n))
