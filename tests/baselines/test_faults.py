@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 import baselines
+from baselines.policy.parameters import checks
+from baselines.registry import get
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.validation import number, whole_number
+from tests.baselines.making import made, usual
 
 UNUSABLE = [
     *([], {}, {"a": 1}, {1, 2}, np.array([1.0, 2.0]), np.array(["dls", "rhc"]), [[1], [1, 2]], object(), None, b"x"),
@@ -28,6 +32,101 @@ def test_parameters_of_any_type_are_taken_or_refused_in_one_line(name):
         for value in UNUSABLE:
             message = refusal(name, parameter, value)
             assert len(message.splitlines()) <= 1, (parameter, value)
+
+
+def bad_values(check):
+    """Values that the check of a parameter refuses, by what it says itself."""
+    if check.func in (number, whole_number):
+        yield from ("x", np.nan, None, True)
+        yield from (check.keywords[bound] for bound in ("above", "below") if bound in check.keywords)
+        yield from (check.keywords["at_least"] - 1,) if "at_least" in check.keywords else ()
+        yield from (check.keywords["at_most"] + 1,) if "at_most" in check.keywords else ()
+        yield from (1.5,) if check.func is whole_number else (np.inf,)
+    else:  # one of several words, or a truth value
+        yield from ("nothing like it", 1, None)
+
+
+@pytest.mark.parametrize("name", baselines.names())
+def test_parameters_out_of_their_range_are_refused_by_name(name):
+    for parameter, check in checks(get(name)).items():
+        for value in bad_values(check):
+            if value is None and "None" in get(name).__dataclass_fields__[parameter].type:
+                continue
+            with pytest.raises(
+                (InvalidInputError, UnknownNameError), match=f"{parameter}.*(expected|Available|Did you mean)"
+            ):
+                made(name, usual(name), **{parameter: value})
+
+
+#: What depends on more than one number, by scenario: refused with the name of the first parameter and these words.
+REFUSED = {
+    "varga7-fast": [
+        ("rhc_gradient", {"alpha_max": 1e-9}, "expected at least alpha_min = 1e-08, got 1e-09"),
+        ("rhc", {"move_blocks": 30}, "expected at most horizon - 1 = 29, a knot at each step, got 30"),
+        ("rhc", {"start_steps": 5, "starts": 3}, "expected 0 where restart_steps is 0, got 5"),
+        ("qp", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000, got 2000"),
+        ("qp", {"posture": [0.0, 1.0]}, r"expected shape \(7,\), got \(2,\)"),
+        ("null_space", {"secondary_gain": 2000.0}, "expected a number below 2/Δt = 2000"),
+        ("null_space", {"objective": "joint_centring"}, "expected an arm with joint limits, 'varga7' has none"),
+        ("null_space", {"posture": (1.0, 2.0)}, r"expected shape \(7,\), got \(2,\)"),
+        ("weighted_pseudoinverse", {"weights": 0.0}, "expected numbers above 0"),
+        ("weighted_pseudoinverse", {"weights": (1.0, 2.0)}, r"expected shape \(7,\), got \(2,\)"),
+        ("weighted_pseudoinverse", {"weights": "heavy"}, "expected an array of real numbers"),
+        ("smoothed", {"relaxation": 2000.0}, "explicit Euler is stable below 2/Δt = 2000, got 2000"),
+        ("smoothed", {"policy": "rhc_gradent"}, "Did you mean 'rhc_gradient'"),
+        ("smoothed", {"policy": "follow_nominal"}, "expected one that acts on what it sees, got the reference"),
+        ("smoothed", {"options": 5}, "expected the parameters of rhc_gradient by name, got 5"),
+        ("predicted", {"delay": 13}, "expected a guess of at most longest_delay = 12 steps, got 13"),
+        ("predicted", {"bandwidth": 5.0}, "expected a guess of at least lowest_bandwidth = 8 Hz, got 5"),
+        ("full_orientation", {"policy": "smoothed"}, "got the policy that is made from others 'smoothed'"),
+        ("mfac", {"rule": "sugihra"}, "Did you mean 'sugihara'"),
+        ("mfac", {"growth": 2.0, "rule": "constant"}, "the damping rule 'constant' has only damping; got 2.0"),
+        ("mfac", {"damping": -1.0}, "expected a finite number of at least 0"),
+        ("mfac", {"growth": 0.5}, "expected a finite number of at least 1"),
+        ("mfac", {"threshold": 0.0, "rule": "threshold"}, "expected a finite number above 0"),
+        ("mfac", {"condition_bounds": (2, 1), "rule": "condition"}, "expected ascending numbers above 0"),
+        ("mfac", {"dampings": (0, 1), "rule": "condition"}, "expected 1 x 4 numbers.* got 1 x 2"),
+        ("mfac", {"dampings": (-1, 1), "rule": "condition"}, "expected rows of numbers of at least 0"),
+        ("fixed_point", {"slope": 0.0}, "expected a number between -1 and 1 other than 0"),
+        ("fixed_point", {"a": 0.0}, "expected a number other than 0"),
+        ("follow_nominal", {"seed": "x"}, "expected a whole number of at least 0"),
+    ],
+    "varga7-random": [
+        ("follow_nominal", {}, "a seed says which episode"),
+        ("fixed_point_extended", {}, "a seed says which episode"),
+    ],
+    "zhang3-helix": [
+        ("follow_nominal", {}, "'zhang3-helix' is given in Cartesian space"),
+        ("smoothed", {}, "stable below 2/Δt = 2, got 300"),
+    ],
+    "faitli3-regular": [
+        ("fixed_point", {"components": (0, 1, 2)}, "expected none with transformation 'transpose'"),
+        ("fixed_point", {"components": (0, 1), "transformation": "none"}, "expected 3 different numbers below 3"),
+        ("fixed_point", {"length": 1.0, "transformation": "none"}, "expected none but with transformation 'transpose'"),
+        ("fixed_point_extended", {"link": 3}, "expected at most 2"),
+        ("fixed_point_extended", {"transformation": "none"}, "a longer x needs the transposed Jacobian"),
+        ("full_orientation", {}, "expected the task 'skew'"),
+    ],
+    "khan8-q1": [
+        ("abstract_rotation", {"task_weights": 0.0}, "expected numbers above 0 and at most 1, got 0.0"),
+        ("abstract_rotation", {"task_weights": (1.0,) * 8}, r"expected shape \(12,\), got \(8,\)"),
+        ("abstract_rotation", {"joint_weights": (1.0,) * 7 + (1.5,)}, "expected numbers above 0 and at most 1"),
+        ("fixed_point", {"transformation": "none"}, "needs as many components of the error as joints"),
+    ],
+    "zhang6-lspb": [
+        ("pink", {"posture_rate": 1e4}, "expected at most 1"),
+        ("pink", {"solver": "dapq"}, "Did you mean 'daqp'"),
+        ("full_orientation", {}, "expected the task 'skew'"),
+    ],
+}
+
+
+@pytest.mark.parametrize("on", REFUSED)
+def test_what_does_not_suit_is_refused(on):
+    for name, parameters, words in REFUSED[on]:
+        parameter = next(iter(parameters), "")
+        with pytest.raises((InvalidInputError, UnknownNameError), match=f"{parameter}.*{words}"):
+            made(name, on, **parameters)
 
 
 @pytest.mark.parametrize(
