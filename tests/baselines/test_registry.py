@@ -106,10 +106,7 @@ def test_messages_name_a_class_without_a_name():
         baselines.make("looking", "zhang3-helix")._recall((1,), None, 1)
 
 
-@pytest.mark.parametrize(
-    "place",
-    ["dls", "package.module:", ":Class", "a:b:c", "a b:C", 3],
-)
+@pytest.mark.parametrize("place", ["dls", "package.module:", ":Class", "a:b:c", "a b:C", 3])
 def test_bad_places_are_refused_and_leave_nothing_behind(place):
     with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got"):
         baselines.register("mine", place)
@@ -155,17 +152,12 @@ def test_places_that_lead_nowhere(tmp_path, monkeypatch, content, message):
 
 
 def test_packages_of_others_bring_policies(entry_points):
-    entry_points(theirs=f"{__name__}:Still", extra=f"{__name__}:Misnamed [fast]")
+    entry_points(theirs=f"{__name__}:Still", extra=f"{__name__}:Misnamed [fast]", dls=f"{__name__}:Still")
     assert baselines.names()[-2:] == ("theirs", "extra")
     assert baselines.get("theirs").__name__ == "Still"
     assert evaluate("zhang3-helix", "theirs", steps=2)[0].policy == "theirs"
     assert baselines.get("extra").__name__ == "Misnamed"
-
-
-def test_names_of_ours_take_precedence_over_those_of_others(entry_points):
-    entry_points(dls=f"{__name__}:Still")
-    assert baselines.names().count("dls") == 1
-    assert baselines.get("dls") is DampedLeastSquares
+    assert baselines.get("dls") is DampedLeastSquares  # names of ours take precedence
 
 
 def test_a_bad_entry_point_takes_nobody_else_away(entry_points):

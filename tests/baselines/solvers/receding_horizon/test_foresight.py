@@ -66,9 +66,7 @@ def test_the_first_call_takes_less_than_three_ordinary_ones():
     assert iterations(60, start_steps=0)[0] > 50 * usual
 
 
-@pytest.mark.parametrize(
-    ("horizon", "knots"), [(2, 1), (31, 7), (101, 11), (301, 19), (1001, 33), (1501, 40), (3001, 56)]
-)
+@pytest.mark.parametrize(("horizon", "knots"), [(2, 1), (101, 11), (3001, 56)])
 def test_knots_of_each_horizon(horizon, knots):
     """The same up to the horizon, whatever it is, and none farther apart than a third of an oscillation of 3 Hz."""
     policy = baselines.make("rhc_foresight", SCENARIO, horizon=horizon)

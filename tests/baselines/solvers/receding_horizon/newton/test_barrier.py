@@ -6,7 +6,6 @@ import pytest
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.workspace import newton_workspace
-from benchmarks.rivals.numpy_horizon import beyond_limits
 from tests.baselines.solvers.receding_horizon.newton.states import (
     draw,
     horizon_of,
@@ -80,24 +79,3 @@ def test_it_tends_to_the_cost_and_the_weighted_excess(at):
     beyond += (np.maximum(np.maximum(path - arm.upper, arm.lower - path), 0.0) / step).sum()
     assert excess == pytest.approx(beyond, rel=1e-9)
     assert beyond > 0.1
-
-
-def test_braking_counts_at_the_last_knot():
-    """The way to a stop, v² / (2 q̈_max), is part of the position there, and only with braking."""
-    problem = problem_of()
-    horizon = horizon_of(problem, draw(np.random.default_rng(0)), knots=3)
-    q = np.clip(horizon.q, problem.model.lower + 1.0, problem.model.upper - 1.0)
-    speed = 0.9 * problem.model.velocity_limit
-    path = q + 2e-3 * speed * np.arange(1, 4)[:, None]
-    room = path[-1] + 0.5 * speed**2 / (2.0 * problem.model.acceleration_limit)  # half of what braking takes
-    arm = problem.model.replace(upper=np.minimum(room, problem.model.upper), home=None)
-    from_there = horizon.__class__(q, horizon.nominal, qdot=speed)
-    narrow = problem_of(arm)
-    assert beyond_limits(narrow, from_there, path)["position"] < 0.0
-    assert beyond_limits(narrow, from_there, path, braking=True)["position"] > 0.01
-    values = []
-    for braking in (False, True):
-        here = path_problem(narrow, from_there, braking)
-        workspace = newton_workspace(here.data.kind, here.nominal.shape[1], *path.shape, True)
-        values.append(merit(here, path, Barrier(1e-9, 100.0), workspace))
-    assert values[1] > values[0] + 100.0

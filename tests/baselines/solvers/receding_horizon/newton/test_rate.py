@@ -9,7 +9,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from baselines.solvers.receding_horizon.newton.cost import rate_cost, true_cost
 from baselines.solvers.receding_horizon.newton.newton_step import pentadiagonal_step
 from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
 from tests.baselines.solvers.receding_horizon.newton.problems import Place, place
@@ -34,15 +33,6 @@ def rated(**parameters):
     return RatedPlace(**vars(place("varga7", "skew", **parameters)))
 
 
-def by_numpy(problem, path):
-    """Σ (Δq̇)² over half the steps of both blocks."""
-    lengths = problem.grid.length
-    qdot = np.diff(np.vstack([problem.start, path]), axis=0) / (lengths[:, None] * problem.data.dt)
-    changes = np.diff(np.vstack([problem.qdot_before, qdot]), axis=0)
-    spans = 0.5 * (lengths + np.append(1.0, lengths[:-1]))
-    return problem.rate_weight * np.sum(changes**2 / spans[:, None])
-
-
 def whole(blocks):
     """The Hessian with the blocks two away from the diagonal."""
     knots, n = blocks.gradient.shape
@@ -50,15 +40,6 @@ def whole(blocks):
     for k in range(2, knots):
         out[k, :, k - 2] = out[k - 2, :, k] = np.diag(blocks.far[k])
     return out.reshape(knots * n, knots * n)
-
-
-@pytest.mark.parametrize("at", [(1,), (1, 2), (3, 5, 6), (1, 2, 4, 7, 12)])
-def test_cost_of_changes(at):
-    here = rated(at=at, limits=False)
-    expected = by_numpy(here.problem, here.path)
-    assert rate_cost(here.problem, here.path) == pytest.approx(expected, rel=1e-12)
-    without = true_cost(here.problem._replace(rate_weight=0.0), here.path, here.workspace)
-    assert true_cost(here.problem, here.path, here.workspace) - without == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("at", [(1,), (1, 2), (1, 2, 4, 7, 12)])
