@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
-import pathlib
 import signal
 import subprocess
 import sys
@@ -56,36 +54,6 @@ def test_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ResultsError, match="Cannot write into"), locked(tmp_path / "file"):
         pass
-
-
-def command(out, *policies, options=()):
-    line = [sys.executable, "-m", "baselines.evaluate", "--scenarios", "varga7-fast", "--steps", "300"]
-    return [*line, "--out", str(out), *options, "--policies", *policies]
-
-
-@pytest.mark.slow
-def test_two_evaluations_at_the_same_time_lose_no_row(tmp_path):
-    """One of them is refused, or comes when the other has ended; what is there at the end is all of what ended well."""
-    groups = [("dls", "moore_penrose", "truncated_svd"), ("null_space", "mfac", "gram_schmidt")]
-    seed = subprocess.run(command(tmp_path, "jacobian_transpose"), capture_output=True, text=True, check=True)
-    assert seed.returncode == 0
-    started = [
-        subprocess.Popen(
-            command(tmp_path, *group, options=["--resume"]), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        for group in groups
-    ]
-    ends = [(*process.communicate(timeout=120), process.returncode) for process in started]
-    wanted = {"jacobian_transpose"}
-    for group, (_, said, code) in zip(groups, ends, strict=True):
-        if code == 0:
-            wanted |= set(group)
-        else:
-            assert code == 2
-            assert said.strip().splitlines()[-1].startswith(f"error: {tmp_path} is in use: process ")
-    rows = json.loads((tmp_path / "results.json").read_text())
-    assert {row["policy"] for row in rows} == wanted
-    assert not list(pathlib.Path(tmp_path).glob(".*"))
 
 
 @dataclasses.dataclass(frozen=True)
