@@ -146,8 +146,7 @@ class NamedWrapper(Wrapper, abc.ABC):
             raise InvalidInputError(f"options: expected the parameters of {kind.name} by name, got {self.options!r}.")
         known_names(f"parameter of {kind.name}", self.options, kind.parameter_names())
         inner = kind(self.inner_problem(), **self.options)
-        object.__setattr__(self, "inner", inner)
-        object.__setattr__(self, "options", inner.parameters)
+        self._settle(inner=inner, options=inner.parameters)
 
     def inner_problem(self) -> Problem:
         """The scenario as the inner policy knows it."""

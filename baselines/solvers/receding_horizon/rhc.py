@@ -132,14 +132,13 @@ class RecedingHorizon(CompiledPolicy):
             raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
         knots = self._knots()
         knots.flags.writeable = False
-        object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
         change = problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0)
         given = {name: getattr(self, name) for name in PlanSettings._fields if name in self.parameters}
         given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
         settings = PlanSettings(**given)
         numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))
-        object.__setattr__(self, "_numbers", numbers)
+        self._settle(offsets=knots, _numbers=numbers)
 
     @property
     def interior_point(self) -> bool:
