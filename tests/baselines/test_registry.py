@@ -106,28 +106,28 @@ def test_messages_name_a_class_without_a_name():
         baselines.make("looking", "zhang3-helix")._recall((1,), None, 1)
 
 
-@pytest.mark.parametrize("place", ["dls", "package.module:", ":Class", "a:b:c", "a b:C", 3])
-def test_bad_places_are_refused_and_leave_nothing_behind(place):
-    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got"):
-        baselines.register("mine", place)
-    assert "mine" not in baselines.names()
+class Unfinished(SolverPolicy):
+    """Solves nothing."""
 
 
-@pytest.mark.parametrize("name", ["", "a b", ".a", 3, "dls", "agent"])
-def test_bad_names_and_those_that_are_taken_are_refused(name):
-    with pytest.raises(InvalidInputError, match=r"expected a name of letters, digits|is registered already"):
-        baselines.register(name, Still)
-
-
-def test_classes_that_are_no_policies_are_refused_and_leave_nothing_behind():
-    class Unfinished(SolverPolicy):
-        pass
-
-    with pytest.raises(InvalidInputError, match="expected a class derived from SolverPolicy"):
-        baselines.register("mine", dict)
-    with pytest.raises(InvalidInputError, match="Unfinished': the class lacks solve"):
-        baselines.register("mine", Unfinished)
-    assert "mine" not in baselines.names()
+@pytest.mark.parametrize(
+    ("name", "place", "message"),
+    [
+        *(
+            ("mine", place, r"expected 'package\.module:Class', got")
+            for place in ("dls", "package.module:", ":Class", "a:b:c", "a b:C", 3)
+        ),
+        *((name, Still, "expected a name of letters, digits") for name in ("", "a b", ".a", 3)),
+        *((name, Still, "is registered already") for name in ("dls", "agent")),
+        ("mine", dict, "expected a class derived from SolverPolicy"),
+        ("mine", Unfinished, "Unfinished': the class lacks solve"),
+    ],
+)
+def test_what_is_refused_leaves_nothing_behind(name, place, message):
+    before = baselines.names()
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.register(name, place)
+    assert baselines.names() == before
 
 
 @pytest.mark.parametrize(
