@@ -1,5 +1,6 @@
 """Receding horizons among bodies: nothing touches, and what is observed of obstacles counts."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -24,6 +25,7 @@ def between(q):
     return np.concatenate([before + shares * (after - before) for before, after in itertools.pairwise(q)])
 
 
+@functools.cache
 def elbow_obstacle():
     """A motion of the Panda, and a ball in the way of its elbow that the null space keeps clear of."""
     scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
