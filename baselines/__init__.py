@@ -17,9 +17,7 @@ from baselines.status import Status
 
 if TYPE_CHECKING:
     from baselines.controller import Controller, Drives, Guards, StopReason
-    from baselines.evaluation.foreign import Wrap
-    from baselines.evaluation.tracking import Tracking
-    from ikgym.scenarios import Preview, Scenario
+    from baselines.evaluation.tracking import track
 
 __all__ = [
     "Controller",
@@ -35,29 +33,15 @@ __all__ = [
     "track",
 ]
 
-#: Names of :mod:`baselines.controller`.
-CONTROLLER = frozenset({"Controller", "Drives", "Guards", "StopReason"})
-
-
-def track(
-    scenario: str | Scenario,
-    policy: Any,
-    *,
-    seed: int = 0,
-    preview: Preview | None = None,
-    steps: int | None = None,
-    wrap: Wrap | None = None,
-) -> Tracking:
-    """Plays one episode, see :func:`baselines.evaluation.tracking.track`."""
-    from baselines.evaluation import tracking
-
-    return tracking.track(scenario, policy, seed=seed, preview=preview, steps=steps, wrap=wrap)
+#: Names that are imported when they are first used, and their modules.
+_LATER = {"track": "evaluation.tracking"}
+_LATER |= dict.fromkeys(("Controller", "Drives", "Guards", "StopReason"), "controller")
 
 
 def __getattr__(name: str) -> Any:
-    """What is imported when it is first used: modules, and the names of the controller."""
+    """Modules and names that are imported when they are first used."""
     if name in {"controller", "evaluate"}:
         return importlib.import_module(f"baselines.{name}")
-    if name in CONTROLLER:
-        return getattr(importlib.import_module("baselines.controller"), name)
+    if name in _LATER:
+        return getattr(importlib.import_module(f"baselines.{_LATER[name]}"), name)
     raise AttributeError(f"module 'baselines' has no attribute {name!r}")

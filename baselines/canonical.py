@@ -1,4 +1,4 @@
-"""Parameters and results as JSON: equal texts for equal values, numbers of few digits, an item of a list a line."""
+"""Parameters and results as JSON: equal texts for equal values, numbers of few digits."""
 
 from __future__ import annotations
 
@@ -31,11 +31,6 @@ def jsonable(value: Any) -> Any:
     return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
 
 
-def rounded(value: float, digits: int = 4) -> float:
+def rounded(value: float, digits: int) -> float:
     """A number with so many significant digits."""
     return float(f"{value:.{digits}g}")
-
-
-def one_line(values: Mapping[str, Any]) -> str:
-    """An object on a line."""
-    return json.dumps(values, ensure_ascii=False, allow_nan=False)

@@ -21,7 +21,7 @@ from tqdm import tqdm
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
-from baselines.files import ResultsError, locked, reading, resumed, write_json
+from baselines.files import ResultsError, locked, resumed, write_json
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from ikgym import scenarios
@@ -100,8 +100,7 @@ def write(
                 bar.update(min(BLOCK, episodes - number))
         whole = _storage(_environment(first), draft)
         for block in sorted(blocks.iterdir()):
-            with reading(block, "Begin anew with --overwrite."):
-                whole.update_from_storage(MinariStorage.read(block))
+            whole.update_from_storage(MinariStorage.read(block))
         # Minari loses the seeds when it copies episodes.
         seeds = [{"seed": job.seeds.seed} for job in jobs]
         whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])
@@ -141,15 +140,15 @@ def _environment(job: Job) -> gym.Env[Any, Any]:
     return RedundantIKEnv(job.scenario, **options)
 
 
-def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
-    spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
-    return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
-
-
 def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:
     """Plays episodes and writes them into a folder."""
     env = _environment(jobs[0])
     _storage(env, folder).update_episodes(_episode(env, job) for job in jobs)
+
+
+def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
+    spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
+    return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
 
 
 def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:

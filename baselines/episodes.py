@@ -109,13 +109,8 @@ def rollouts(
 ) -> list[Episode]:
     """Plays several episodes, with one call of the policy for all of them in each step where that is possible.
 
-    Args:
-        scenario: The scenario.
-        policy: The policy. One that takes no batch plays one episode after the other.
-        seeds: Reset seeds, or all seeds, one an episode.
-        preview: Steps ahead that the policy is shown; its own if left out.
-        timed: Whether the calls are timed; then episodes are played one after the other.
-        tick: Reports progress; the steps of all episodes count.
+    The arguments are those of :func:`rollout`. Timed, or with a policy that takes no batch, it plays one episode after
+    the other. Progress counts the steps of all episodes.
 
     Returns:
         The same for each seed as :func:`rollout` gives, bit for bit.
@@ -145,9 +140,9 @@ def sequences(
         scenario: The scenario.
         policy: The policy.
         chains: The seeds of each sequence, all of one length.
-        preview: Steps ahead that the policy is shown; its own if left out.
-        timed: Whether the calls are timed; then sequences are played one after the other.
-        tick: Reports progress; the steps of all episodes count.
+        preview: As in :func:`rollout`.
+        timed: As in :func:`rollouts`.
+        tick: As in :func:`rollouts`.
 
     Returns:
         The episodes of each sequence.
@@ -201,13 +196,11 @@ def _chain(
     timed: bool,
 ) -> list[list[Episode]]:
     """The episodes of each sequence; the sequences are played side by side."""
-    out: list[list[Episode]] = [[] for _ in chains]
-    state: Any = None
+    played, state = [], None
     for seeds in zip(*chains, strict=True):
         episodes, state = _play(scenario, policy, seeds, preview, tick, single=single, timed=timed, state=state)
-        for chain, episode in zip(out, episodes, strict=True):
-            chain.append(episode)
-    return out
+        played.append(episodes)
+    return [list(episodes) for episodes in zip(*played, strict=True)]
 
 
 def _play(

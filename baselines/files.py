@@ -62,11 +62,7 @@ def write_json(file: pathlib.Path, value: object) -> None:
 
 
 def read_bytes(file: pathlib.Path, most: int = LARGEST) -> bytes:
-    """The content of a file, see :func:`ikgym.files.read_user_file`.
-
-    Args:
-        file: The file.
-        most: Largest size in bytes.
+    """The content of a file of at most so many bytes, see :func:`ikgym.files.read_user_file`.
 
     Raises:
         ResultsError: It cannot be read.
@@ -78,11 +74,7 @@ def read_bytes(file: pathlib.Path, most: int = LARGEST) -> bytes:
 
 
 def read_json(file: pathlib.Path, advice: str = "") -> Any:
-    """The value in a JSON file.
-
-    Args:
-        file: The file.
-        advice: A sentence at the end of the message if the file is damaged.
+    """The value in a JSON file; see :func:`reading` for ``advice``.
 
     Raises:
         ResultsError: It cannot be read, or is not JSON.
@@ -92,11 +84,7 @@ def read_json(file: pathlib.Path, advice: str = "") -> Any:
 
 
 def read_arrays(file: pathlib.Path, advice: str = "") -> dict[str, npt.NDArray[Any]]:
-    """The arrays in an .npz file, by name.
-
-    Args:
-        file: The file.
-        advice: A sentence at the end of the message if the file is damaged.
+    """The arrays in an .npz file, by name; see :func:`reading` for ``advice``.
 
     Raises:
         ResultsError: It cannot be read, or is damaged.
@@ -113,15 +101,12 @@ def from_json(kind: type[T], values: object) -> T:
     """
     if not isinstance(values, dict):
         raise ValueError(f"expected an object with the keys of a {kind.__name__}, got {type(values).__name__}")
-    fields = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]  # T is a dataclass
-    required = [name for name, field in fields.items() if _required(field)]
-    if wrong := [*(name for name in required if name not in values), *(name for name in values if name not in fields)]:
+    known = {field.name: field for field in dataclasses.fields(kind)}  # type: ignore[arg-type]  # T is a dataclass
+    missing = dataclasses.MISSING
+    needed = [name for name, one in known.items() if one.default is missing and one.default_factory is missing]
+    if wrong := [*(name for name in needed if name not in values), *(name for name in values if name not in known)]:
         raise ValueError(f"the key {wrong[0]!r} is {'unknown' if wrong[0] in values else 'missing'}")
     return kind(**values)
-
-
-def _required(field: dataclasses.Field[Any]) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 @contextlib.contextmanager
@@ -147,7 +132,7 @@ def reading(file: pathlib.Path, advice: str = "") -> Iterator[None]:
 
 
 def resumed(
-    manifest: pathlib.Path, about: Mapping[str, Any], *, resume: bool, overwrite: bool, advice: str = ""
+    manifest: pathlib.Path, about: Mapping[str, Any], *, resume: bool, overwrite: bool
 ) -> dict[str, Any] | None:
     """Decides whether the work in a folder is resumed; the caller has locked the folder.
 
@@ -156,7 +141,6 @@ def resumed(
         about: Values that must be equal in the manifest of the work that is resumed.
         resume: Whether to continue with work that exists.
         overwrite: Whether to replace work that exists.
-        advice: A sentence at the end of the message if the manifest is damaged.
 
     Returns:
         The manifest of the work to be resumed; None if it begins anew.
@@ -167,9 +151,9 @@ def resumed(
     check_flags(manifest, resume=resume, overwrite=overwrite)
     if overwrite or not manifest.exists():
         return None
-    there = read_json(manifest, advice)
+    there = read_json(manifest)
     if not isinstance(there, dict):
-        raise ResultsError(f"{manifest} is damaged: expected an object, got {type(there).__name__}. {advice}".rstrip())
+        raise ResultsError(f"{manifest} is damaged: expected an object, got {type(there).__name__}.")
     if names := [name for name in about if there.get(name) != about[name]]:
         changes = ", ".join(f"{name} ({there.get(name)!r} there, {about[name]!r} here)" for name in names)
         raise ResultsError(f"{manifest} differs in {changes}: resume with the same, or choose another folder.")
@@ -209,7 +193,7 @@ def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
     """Locks a folder for this process; the operating system frees the lock of a process that dies.
 
     Args:
-        folder: The folder; created if it does not exist.
+        folder: Created if it does not exist.
         patience: How long to wait for another process that writes into it, in [s].
 
     Raises:

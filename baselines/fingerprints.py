@@ -58,12 +58,7 @@ def same(one: object, other: object) -> bool:
 
 
 def episode_hash(scenario: Scenario | str, seed: int) -> str:
-    """Twelve digits that identify an episode: its scenario, the version of the cost, and its seed.
-
-    Args:
-        scenario: The scenario, or its fingerprint.
-        seed: The reset seed.
-    """
+    """Twelve digits that identify an episode: its scenario, or the fingerprint of that, and its reset seed."""
     return set_hash(scenario, (seed,))
 
 

@@ -22,7 +22,7 @@ from ikgym.validation import known_names
 #: The entry points that other packages register policies by: ``name = "module:Class"``.
 GROUP = "ikgym.policies"
 
-#: How a import_path is written: ``package.module:Class``.
+#: How an import path is written: ``package.module:Class``.
 PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 _SOLVERS = "baselines.solvers"
@@ -67,7 +67,7 @@ _import_paths: dict[str, str] = {
     "oracle": "baselines.oracle.policy:Oracle",
 }
 
-#: Those that are nothing by their name alone, or but for some scenarios, and so are no part of "all policies".
+#: Policies that need parameters, or suit some scenarios only, so that `all` leaves them out.
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
     "planned": "baselines.paths.planned:Planned",
@@ -91,7 +91,7 @@ def register(name: str, import_path: str | type[SolverPolicy]) -> None:
         import_path: Where its class is, ``"package.module:Class"``, imported when it is first asked for; or the class.
 
     Raises:
-        InvalidInputError: The name is taken or no name, the import_path has another form, or the class is no policy.
+        InvalidInputError: The name is taken or no name, the import path has another form, or the class is no policy.
     """
     if not isinstance(name, str) or not re.fullmatch(r"\w[\w.-]*", name):
         raise InvalidInputError(f"policy: expected a name of letters, digits, '_', '-' and '.', got {name!r}.")
@@ -126,10 +126,8 @@ def known(name: object) -> bool:
 def name_of(kind: type[SolverPolicy]) -> str:
     """Name of a class in results: its name in the registry, else its import path."""
     import_path = place_of(kind)
-    named = (
-        name for name, where in {**_entry_points(), **_import_paths, **_incomplete}.items() if where == import_path
-    )
-    return next((name for name in named if get(name) is kind), import_path)
+    places = {**_entry_points(), **_import_paths, **_incomplete}
+    return next((name for name, where in places.items() if where == import_path and get(name) is kind), import_path)
 
 
 def place_of(kind: type[Any]) -> str:
@@ -138,10 +136,7 @@ def place_of(kind: type[Any]) -> str:
 
 
 def resolve(import_path: str) -> type[SolverPolicy]:
-    """The class at a import_path.
-
-    Args:
-        import_path: ``"package.module:Class"``.
+    """The class at an import path.
 
     Raises:
         InvalidInputError: It cannot be imported, or is no class of policies.
@@ -150,10 +145,7 @@ def resolve(import_path: str) -> type[SolverPolicy]:
 
 
 def load(import_path: str) -> object:
-    """Whatever is at a import_path.
-
-    Args:
-        import_path: ``"package.module:attribute"``.
+    """Whatever is at an import path ``"package.module:attribute"``.
 
     Raises:
         InvalidInputError: It has another form, or cannot be imported.
@@ -205,7 +197,7 @@ def _entry_points() -> dict[str, str]:
 
     Nothing is checked before it is asked for: one bad entry must not take the other policies away.
     """
-    # Extras behind the import_path, as in "module:Class [extra]", are for installers.
+    # Extras behind the import path, as in "module:Class [extra]", are for installers.
     return {one.name: one.value.partition("[")[0].strip() for one in importlib.metadata.entry_points(group=GROUP)}
 
 

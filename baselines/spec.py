@@ -42,14 +42,11 @@ def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
 
 
 def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
-    """Place and parameters of a policy that is no registered one.
+    """Place and parameters of a policy that is no registered one; None where the specification has another form.
 
     Args:
         spec: ``"package.module:Class"``, ``"package.module:Class:parameter=value,…"``, or a pair of the first and
             parameters. What begins with the name of a registered policy is not meant.
-
-    Returns:
-        The place and the parameters; None where the specification has another form.
 
     Raises:
         InvalidInputError: The parameters have another form, or one is given twice.
@@ -66,14 +63,10 @@ def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Any]:
-    """Names and values.
-
-    Args:
-        text: ``"name=value,name=value"``; values are Python's literals, anything else is taken for plain text.
-        source: Its context, for the message.
+    """Names and values of ``"name=value,name=value"``; values are Python's literals, anything else is plain text.
 
     Raises:
-        InvalidInputError: The text has another form, or names one twice.
+        InvalidInputError: The text has another form, or names one twice; the message begins with ``source``.
     """
     out: dict[str, Any] = {}
     for part in _split(text):

@@ -82,12 +82,7 @@ class Workers:
         return self.cluster is None and self.number == 1
 
     def check(self) -> None:
-        """Connects to the cluster, if there is one; called before any file is written or overwritten.
-
-        Raises:
-            MissingDependencyError: Ray is not installed.
-            ClusterError: The address is missing, or no cluster answers there.
-        """
+        """Connects to the cluster, if there is one, see :func:`connect`; called before any file is written."""
         if self.cluster is not None:
             connect()
 
@@ -184,13 +179,8 @@ def _end_with(pipe: Connection) -> None:
 def _tasks() -> Iterator[Call]:
     """Tasks on the cluster, each with one core."""
     ray = connect()
-    lost = (
-        ray.exceptions.WorkerCrashedError,
-        ray.exceptions.NodeDiedError,
-        ray.exceptions.ObjectLostError,
-        ray.exceptions.OutOfMemoryError,
-        ray.exceptions.LocalRayletDiedError,
-    )
+    kinds = ("WorkerCrashedError", "NodeDiedError", "ObjectLostError", "OutOfMemoryError", "LocalRayletDiedError")
+    lost = tuple(getattr(ray.exceptions, kind) for kind in kinds)
     remote = ray.remote(num_cpus=1, max_retries=0)(_on_one_core)
     running = set[Any]()
 
@@ -230,10 +220,7 @@ def _on_one_core(function: Callable[[Any], Any], unit: Any) -> tuple[Any, Except
 
 
 def connect() -> Any:
-    """Connects to the cluster at the address in the environment, once.
-
-    Returns:
-        The module `ray`.
+    """The module `ray`, connected to the cluster at the address in the environment.
 
     Raises:
         MissingDependencyError: Ray is not installed.

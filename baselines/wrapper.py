@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,12 +35,6 @@ class InnerStep(NamedTuple):
     status: npt.NDArray[np.int64]
     iterations: npt.NDArray[np.int64]
 
-    @classmethod
-    def of(cls, policy: SolverPolicy, batch: Batch, memory: Memory) -> Self:
-        """A policy's step, see :meth:`SolverPolicy.act`."""
-        action, state = policy.act(batch, memory)
-        return cls(action, remembered(state), *policy.report(state))
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wrapper(SolverPolicy, abc.ABC):
@@ -63,11 +57,7 @@ class Wrapper(SolverPolicy, abc.ABC):
     inner: SolverPolicy | None = dataclasses.field(init=False, repr=False)
 
     def own_memory(self, rows: int) -> Memory:
-        """The wrapper's own memory at the start of an episode, preferably a NamedTuple.
-
-        Args:
-            rows: B, the leading axis of each array.
-        """
+        """The wrapper's own memory at the start of an episode, preferably a NamedTuple."""
         del rows
         return ()
 
@@ -98,14 +88,10 @@ class Wrapper(SolverPolicy, abc.ABC):
         return len(own), type(own)
 
     def ask(self, batch: Batch, memory: Memory) -> InnerStep:
-        """The inner policy's step.
-
-        Args:
-            batch: Its observations, see :meth:`SolverPolicy.act`.
-            memory: Its part of the memory.
-        """
+        """The inner policy's step, see :meth:`SolverPolicy.act`, for its observations and its part of the memory."""
         assert self.inner is not None
-        return InnerStep.of(self.inner, batch, memory)
+        action, state = self.inner.act(batch, memory)
+        return InnerStep(action, remembered(state), *self.inner.report(state))
 
     def solution(self, qdot: FloatArray, own: Memory, step: InnerStep) -> Solution:
         """The result of `solve`: status and iterations are those of the inner policy.
@@ -160,8 +146,7 @@ class NamedWrapper(Wrapper, abc.ABC):
             raise InvalidInputError(f"options: expected the parameters of {kind.name} by name, got {self.options!r}.")
         known_names(f"parameter of {kind.name}", self.options, kind.parameter_names())
         inner = kind(self.inner_problem(), **self.options)
-        object.__setattr__(self, "inner", inner)
-        object.__setattr__(self, "options", inner.parameters)
+        self._settle(inner=inner, options=inner.parameters)
 
     def inner_problem(self) -> Problem:
         """The scenario as the inner policy knows it."""

@@ -12,7 +12,7 @@ from baselines.controller import kernels
 from baselines.controller.drives import IDENTIFY, LONGEST, Drives, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, Window, coordinates, numbers
-from baselines.controller.timing import Timing, timing_of, warn_if_slow
+from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import remembered
 from baselines.spec import PolicySpec
@@ -152,16 +152,12 @@ class Controller:
 
         Args:
             calls: How many calls are timed.
-
-        Returns:
-            The duration of a call.
         """
         calls = whole_number("calls", calls, at_least=1)
         self.reset()
-        timing = timing_of(self._play(calls))
+        spent = self._play(calls)
         self.reset()
-        warn_if_slow(self.policy.name, timing, self._problem.dt)
-        return timing
+        return timing_of(self.policy.name, spent, self._problem.dt)
 
     @property
     def stopped(self) -> StopReason | None:

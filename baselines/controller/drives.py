@@ -67,14 +67,8 @@ def policy_for(
 ) -> SolverPolicy:
     """A policy for an arm with such drives: ``predicted`` around it, unless the drives are perfect.
 
-    What predicts knows the acceleration limits of the guards where the model has none, so that nothing jumps.
-
-    Args:
-        scenario: The scenario.
-        policy: Its name, with parameters or without; or a policy that was made for the scenario. One that has
-            ``predicted`` in it is not wrapped again.
-        drives: The drives, or :data:`IDENTIFY`.
-        guards: The guards.
+    What predicts knows the acceleration limits of the guards where the model has none, so that nothing jumps. A policy
+    that has ``predicted`` in it is not wrapped again. The arguments are those of :class:`Controller`.
 
     Raises:
         InvalidInputError: The drives are neither, or told twice; or the policy is none, belongs to another scenario, or
@@ -110,7 +104,6 @@ def identified(diagnostics: Mapping[str, FloatArray]) -> Drives | None:
 
 
 def _named(policy: PolicySpec | SolverPolicy) -> tuple[str, dict[str, Any]]:
-    """Name and parameters of a policy."""
     if not isinstance(policy, SolverPolicy):
         return parse_policy(policy)
     name = registry.name_of(type(policy))
@@ -123,7 +116,6 @@ def _named(policy: PolicySpec | SolverPolicy) -> tuple[str, dict[str, Any]]:
 
 
 def _check(policy: SolverPolicy, scenario: Scenario) -> None:
-    """Checks that a policy was made for a scenario."""
     ours = scenario.model.joints, scenario.task.name, scenario.dt
     its = policy.problem.model.joints, policy.problem.task.name, policy.problem.dt
     if ours != its:

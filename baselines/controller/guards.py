@@ -73,10 +73,9 @@ class Guards(Frozen):
         return np.array([model.lower - self.tolerance, model.upper + self.tolerance, problem.dt * fastest])
 
     def numbers(self, delay: int) -> FloatArray:
-        """Age, tolerance, largest errors, inf where there is none, and periods without motion. Shape (5,).
+        """Age, tolerance, largest errors, inf where there is none, and periods without motion, with the longest delay.
 
-        Args:
-            delay: The longest delay of commands, in periods.
+        Shape (5,).
         """
         errors = [np.inf if one is None else one for one in (self.position_error, self.orientation_error)]
         return np.array([self.age, self.tolerance, *errors, self.age + delay])

@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.controller.kernels import convert, same
+from baselines.policy.arguments import as_floats
 from ikgym.exceptions import InvalidInputError
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, shortened
 
 #: Task coordinates, or rotation and position.
 Pose = npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]
-
-_FLOAT = np.dtype(np.float64)
 
 
 def numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
@@ -24,10 +23,10 @@ def numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
     Raises:
         InvalidInputError: It is no array of numbers of that shape.
     """
-    if type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.carray:
-        array: FloatArray = value
-    else:
-        array = _converted(name, value)
+    try:
+        array = as_floats(value)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shortened(value)}.") from None
     given = array.shape
     if given != shape and (
         len(given) != len(shape) or any(w not in {None, n} for n, w in zip(given, shape, strict=True))
@@ -37,31 +36,16 @@ def numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
     return array
 
 
-def _converted(name: str, value: Any) -> FloatArray:
-    try:
-        raw = np.asarray(value)
-        if raw.dtype.kind not in "fiub":
-            raise TypeError
-        return np.array(raw, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shortened(value)}.") from None
-
-
 def is_pair(pose: Any) -> bool:
     """Whether a pose, or several, are given as rotation and position."""
     return isinstance(pose, tuple) and len(pose) == 2 and np.ndim(pose[0]) == np.ndim(pose[1]) + 1
 
 
 def coordinates(name: str, task: Task, pose: Any) -> FloatArray:
-    """Task coordinates of one pose. Shape (m,).
-
-    Args:
-        name: Its name in messages.
-        task: The task.
-        pose: Task coordinates (m,), or rotation (3, 3) and position (3,) in [m].
+    """Task coordinates of one pose, given as such or as rotation (3, 3) and position (3,) in [m]. Shape (m,).
 
     Raises:
-        InvalidInputError: It has another shape.
+        InvalidInputError: It has another shape; the message has the name.
     """
     if not is_pair(pose):
         return numbers(name, pose, (task.size,))

@@ -21,14 +21,9 @@ class Timing(NamedTuple):
     p99: float
 
 
-def timing_of(spent: Sequence[float]) -> Timing:
-    """What durations in [s] come to."""
-    p50, p99 = np.percentile(spent, (50, 99))
-    return Timing(float(p50), float(p99))
-
-
-def warn_if_slow(name: str, timing: Timing, period: float) -> None:
-    """Warns where calls of a policy take longer than a control period in [s]."""
+def timing_of(name: str, spent: Sequence[float], period: float) -> Timing:
+    """The durations of a policy's calls; warns where they are longer than a control period. All in [s]."""
+    timing = Timing(*map(float, np.percentile(spent, (50, 99))))
     if timing.p99 > period:
         warnings.warn(
             f"{name} does not keep the control period of {1e3 * period:g} ms: 99 % of its calls take up to "
@@ -36,3 +31,4 @@ def warn_if_slow(name: str, timing: Timing, period: float) -> None:
             RuntimeWarning,
             stacklevel=3,
         )
+    return timing

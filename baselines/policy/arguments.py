@@ -37,13 +37,7 @@ REPORTED = len(Report._fields)
 
 
 def pack(status: npt.NDArray[np.int64], iterations: npt.NDArray[np.int64], memory: Memory) -> Memory:
-    """A state from its parts.
-
-    Args:
-        status: Values of :class:`baselines.status.Status`. Shape (B,).
-        iterations: Iterations made. Shape (B,).
-        memory: Memory of the solver, each array with a leading axis of B.
-    """
+    """A state from status (B,), iterations (B,) and the memory."""
     return status, iterations, *memory
 
 
@@ -53,26 +47,14 @@ def remembered(state: Memory) -> Memory:
 
 
 def signature(example: Memory, rows: int) -> Signature:
-    """Shapes and types of a memory of so many rows.
-
-    Args:
-        example: The memory of one row.
-        rows: B.
-    """
+    """Shapes and types of a memory of so many rows, from the memory of one row."""
     return [((rows, *array.shape[1:]), array.dtype, True) for array in example]
 
 
 def checked_memory(name: str, state: object, expected: Signature, rows: int) -> Memory:
-    """The memory in a state that a user hands in.
+    """The memory in a state that a user hands in, for the policy of a name and B rows.
 
-    Args:
-        name: The policy's, for messages.
-        state: The alleged state.
-        expected: See :func:`signature`.
-        rows: B, of the observations that come with it.
-
-    Returns:
-        The memory; copies of arrays that kernels would have to be compiled anew for, such as read-only ones.
+    Arrays that kernels would have to be compiled anew for, such as read-only ones, are copied.
 
     Raises:
         InvalidInputError: It is no state of the policy, or belongs to another batch.
@@ -90,7 +72,6 @@ def checked_memory(name: str, state: object, expected: Signature, rows: int) -> 
 
 
 def _refused(name: str, state: object, expected: Signature, rows: int) -> InvalidInputError:
-    """An error that says why a state is none."""
     given: object = type(state).__name__
     if isinstance(state, tuple):
         given = [getattr(part, "shape", type(part).__name__) for part in state]
@@ -123,13 +104,7 @@ def truth_values(episode_start: npt.ArrayLike, rows: int) -> npt.NDArray[np.bool
 
 
 def replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
-    """The memory, with some rows of another one.
-
-    Args:
-        memory: Each array with a leading axis of B.
-        fresh: Arrays of the same shapes.
-        rows: Which rows are those of `fresh`. Shape (B,).
-    """
+    """The memory, with some rows those of a fresh one. Shape of ``rows`` (B,)."""
     return tuple(np.where(rows.reshape(-1, *[1] * (k.ndim - 1)), f, k) for k, f in zip(memory, fresh, strict=True))
 
 
@@ -169,9 +144,6 @@ class ObservationReader:
         """The arrays of an observation as they are, how many rows they have, and whether it was a single observation.
 
         Whether the numbers are finite is left to :func:`all_finite`, which a compiled solver can do on its way.
-
-        Args:
-            observation: As the environment gives it; single, or all arrays with a leading batch axis.
 
         Raises:
             InvalidInputError: The observation lacks something, has a wrong shape, or shows too little.
@@ -221,11 +193,6 @@ class ObservationReader:
     def extras(self, observation: Observation, rows: int, single: bool) -> Parts:
         """Ages of measurements, past commands and obstacles, None where the observation has none.
 
-        Args:
-            observation: As the environment gives it.
-            rows: B, as the call told.
-            single: Whether it has no row axis.
-
         Raises:
             InvalidInputError: One of them has a wrong shape, is not finite, or an age is below 0.
         """
@@ -239,7 +206,7 @@ def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tupl
     if key not in observation:
         return None
     try:
-        array = _as_floats(observation[key])
+        array = as_floats(observation[key])
     except (TypeError, ValueError) as e:
         raise InvalidInputError(f"observation[{key!r}]: expected an array of numbers ({e}).") from None
     expected = (*lead, *tail)
@@ -270,7 +237,7 @@ def _floats(observation: Observation) -> Parts:
         arrays: Parts = _parts(observation)
         for array in arrays:
             if not (type(array) is np.ndarray and array.dtype is _FLOAT and array.flags.carray):
-                return tuple([_as_floats(part) for part in arrays])
+                return tuple([as_floats(part) for part in arrays])
         return arrays
     except (KeyError, IndexError, TypeError, ValueError) as e:
         keys = sorted(observation) if isinstance(observation, Mapping) else type(observation).__name__
@@ -284,7 +251,7 @@ def not_finite() -> InvalidInputError:
     return InvalidInputError("observation: expected finite numbers, got NaN or infinity.")
 
 
-def _as_floats(value: object) -> FloatArray:
+def as_floats(value: object) -> FloatArray:
     """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings.
 
     Read-only arrays are copied: the kernels would be compiled anew for them.

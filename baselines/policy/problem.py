@@ -42,8 +42,7 @@ class Problem(Frozen):
     obstacles_shown: bool = False
 
     def __post_init__(self) -> None:
-        limit = frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,))
-        object.__setattr__(self, "velocity_limit", limit)
+        self._settle(velocity_limit=frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,)))
 
     @property
     def largest_qdot(self) -> FloatArray:

@@ -15,23 +15,12 @@ _sharing = threading.local()
 
 
 def undivided(rows: int, grain: int) -> bool:
-    """Whether so many rows are solved in one call, not by several threads.
-
-    Args:
-        rows: Number of rows.
-        grain: Rows that are worth a thread.
-    """
+    """Whether so many rows are solved in one call; ``grain`` rows are worth a thread."""
     return rows < 2 * grain or getattr(_sharing, "now", False)
 
 
 def divided(solve: Callable[[slice], Solution], rows: int, grain: int) -> Solution:
-    """The solution of all rows, each thread solving a part of them.
-
-    Args:
-        solve: Solves a part of the rows.
-        rows: Number of rows.
-        grain: Rows that are worth a thread.
-    """
+    """The solution of all rows, each thread solving a part of at least ``grain`` rows."""
     parts: dict[int, Solution] = {}
 
     def work(start: int, stop: int) -> None:

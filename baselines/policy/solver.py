@@ -69,8 +69,6 @@ class SolverPolicy(Frozen, abc.ABC):
     batched: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
-    #: Whether the policy is read from a file, as learned agents are.
-    from_file: ClassVar[bool] = False
     #: The parameter that stands alone behind the name, as in ``"agent:PATH"``; None where all of them have to be named.
     positional: ClassVar[str | None] = None
     #: Parameters without which nobody can tell whether the policy suits a scenario.
@@ -88,11 +86,7 @@ class SolverPolicy(Frozen, abc.ABC):
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:
-        """The policy for a scenario.
-
-        Args:
-            scenario: The tracking problem; the policy receives its :class:`Problem` only.
-            **parameters: The policy's own.
+        """The policy for a scenario, of which it receives its :class:`Problem` only.
 
         Raises:
             InvalidInputError: A parameter is refused.
@@ -201,26 +195,16 @@ class SolverPolicy(Frozen, abc.ABC):
         return self._named(remembered(state))
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
-        """A memory, cleared where an episode begins.
-
-        Args:
-            memory: As :meth:`memory` or the last call gave it.
-            rows: Where one begins. Shape (B,).
-        """
+        """A memory, cleared in the rows where an episode begins. Shape (B,)."""
         return replace_rows(memory, self.memory(len(rows)), rows) if memory else memory
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """Diagnostics of the last solve by name, read from the state that `predict` returned.
-
-        Returns:
-            Arrays with a leading axis of B; nothing for most solvers.
-        """
+        """Diagnostics of the last solve by name, each of shape (B, …), from the state that `predict` returned."""
         del state
         return {}
 
     @functools.cached_property
     def _read(self) -> ObservationReader:
-        """The arrays of an observation, checked, their rows, and whether there was a single one."""
         return ObservationReader(self.name, self.problem, self.preview)
 
     def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
@@ -264,7 +248,6 @@ class SolverPolicy(Frozen, abc.ABC):
         return self.memory(1)
 
     def _undivided(self, rows: int) -> bool:
-        """Whether so many rows are solved in one call, not by several threads."""
         return undivided(rows, self.grain)
 
     @classmethod

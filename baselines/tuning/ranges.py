@@ -84,13 +84,7 @@ def of(spec: str, ranges: Mapping[str, Mapping[str, Range]]) -> Mapping[str, Ran
 
 
 def suggested(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters of a trial.
-
-    Args:
-        trial: The trial.
-        ranges: How parameters are varied.
-        given: Parameters that the solver is given; one with a dot in its name replaces one key of them.
-    """
+    """The parameters of a trial; a name with a dot replaces one key of a given parameter."""
     out: dict[str, Any] = {}
     for name, line in ranges.items():
         if any(out.get(other) not in values for other, values in line.get("when", {}).items()):
@@ -107,12 +101,6 @@ def suggested(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any
 
 
 def nested(name: str, value: object, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameter that a name with a dot belongs to, with one key changed.
-
-    Args:
-        name: Name of a parameter, or of a key in a parameter that is a table.
-        value: Its value.
-        given: Parameters whose other keys are kept.
-    """
+    """The parameter that a name with a dot belongs to, with one key changed and the other given ones kept."""
     outer, _, inner = name.partition(".")
     return {outer: {**given.get(outer, {}), inner: value} if inner else value}

@@ -84,10 +84,8 @@ class Search:
     @property
     def about(self) -> dict[str, Any]:
         """The values that must be equal when a search is resumed."""
-        ranges = canonical(dict(self.ranges))
-        return {"fingerprint": fingerprint(self.scenario), "episodes": len(self.seeds), "seed": self.seed} | {
-            "ranges": ranges
-        }
+        about = {"fingerprint": fingerprint(self.scenario), "episodes": len(self.seeds), "seed": self.seed}
+        return about | {"ranges": canonical(dict(self.ranges))}
 
 
 def searches(

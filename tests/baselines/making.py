@@ -56,6 +56,6 @@ def circle(arm="panda", dt=2e-3, task="pose", speed=0.25, steps=400, **changes):
         trajectory=trajectory,
         task=ikgym.tasks.get(task),
         dt=dt,
-        steps=400,
+        steps=steps,
         start=arm.home,
     )

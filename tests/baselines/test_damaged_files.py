@@ -74,52 +74,32 @@ def test_only_regular_files_of_a_bounded_size_are_opened(name, kind, tmp_path):
         read(file)
 
 
-def spliced(content, cuts):
-    """Bytes with pieces of them replaced."""
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The content of good files, and the functions that read them."""
+    folder = tmp_path_factory.mktemp("good")
+    agent = pathlib.Path(write_agent(folder / "it.safetensors", scenarios.get("varga7-fast"), hidden=(2,)))
+    out = {"it.safetensors": (agent.read_bytes(), READERS["it.safetensors"])}
+    for name in ("varga7-fast", "varga7-random"):
+        scenarios.get(name).save(folder / f"{name}.toml")
+        out[f"{name}.toml"] = (folder / f"{name}.toml").read_bytes(), scenarios.load
+    out["timed.csv"] = TIMED, from_csv
+    out["timeless.csv"] = TIMELESS, functools.partial(from_csv, speed=1.0, acceleration=1.0)
+    out["arm.urdf"] = urdf(arms.get("planar2")).encode(), arms.from_urdf
+    return out
+
+
+@pytest.mark.parametrize(
+    "name", ["it.safetensors", "varga7-fast.toml", "varga7-random.toml", "timed.csv", "timeless.csv", "arm.urdf"]
+)
+@settings(max_examples=EXAMPLES)
+@given(cuts=BYTES)
+def test_files_with_pieces_replaced_are_read_or_refused(files, name, cuts):
+    content, read = files[name]
     for place, length, new in cuts:
         at = int(place * len(content))
         content = content[:at] + new + content[at + length :]
-    return content
-
-
-def tried(name, content, read):
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(IkgymError):
         file = pathlib.Path(folder) / name
         file.write_bytes(content)
-        with contextlib.suppress(IkgymError):
-            read(file)
-
-
-@pytest.fixture(scope="module")
-def agent(tmp_path_factory):
-    file = write_agent(tmp_path_factory.mktemp("agent") / "it.safetensors", scenarios.get("varga7-fast"), hidden=(2,))
-    return pathlib.Path(file).read_bytes()
-
-
-@settings(max_examples=EXAMPLES)
-@given(cuts=BYTES)
-def test_agents(agent, cuts):
-    tried("it.safetensors", spliced(agent, cuts), READERS["it.safetensors"])
-
-
-@settings(max_examples=EXAMPLES)
-@given(cuts=BYTES, timed=st.booleans())
-def test_waypoints(cuts, timed):
-    content, given = (TIMED, {}) if timed else (TIMELESS, {"speed": 1.0, "acceleration": 1.0})
-    tried("points.csv", spliced(content, cuts), lambda file: from_csv(file, **given))
-
-
-@settings(max_examples=EXAMPLES)
-@given(cuts=BYTES)
-def test_robots(cuts):
-    pytest.importorskip("pinocchio")
-    tried("arm.urdf", spliced(urdf(arms.get("planar2")).encode(), cuts), arms.from_urdf)
-
-
-@settings(max_examples=EXAMPLES)
-@given(cuts=BYTES)
-@pytest.mark.parametrize("name", ["varga7-fast", "varga7-random"])
-def test_scenarios(name, cuts, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("scenario")
-    scenarios.get(name).save(folder / "it.toml")
-    tried("it.toml", spliced((folder / "it.toml").read_bytes(), cuts), scenarios.load)
+        read(file)

@@ -17,15 +17,14 @@ def shown(preview, rows=None):
     return observation if rows is None else {key: np.stack([value] * rows) for key, value in observation.items()}
 
 
-@pytest.mark.parametrize("value", [np.nan, -np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("key", ["q", "qdot", "pose", "nominal", "remaining"])
-def test_any_number_that_is_not_finite_is_found(key, value):
+def test_any_number_that_is_not_finite_is_found(key):
     parts = {key: part.copy() for key, part in shown(40, rows=2).items()}
-    assert all_finite(*parts.values())
-    parts[key].flat[-1] = value
-    assert not all_finite(*parts.values())
-    parts[key].flat[-1] = np.copysign(np.finfo(float).max, value)
-    assert all_finite(*parts.values())
+    for value in (np.nan, -np.nan, np.inf, -np.inf):
+        parts[key].flat[-1] = value
+        assert not all_finite(*parts.values())
+        parts[key].flat[-1] = np.copysign(np.finfo(float).max, value)
+        assert all_finite(*parts.values())
 
 
 @pytest.fixture
@@ -37,16 +36,15 @@ def blocks_held():
 
 
 @pytest.mark.parametrize(
-    ("name", "parameters"),
+    "parameters",
     [
-        ("rhc", {"horizon": 3, "rate_weight": 1e-3}),
-        ("rhc", {"horizon": 4, "starts": 2, "restart_steps": 3, "iterations": 1, "recovery_steps": 2}),
-        ("rhc_foresight", {"horizon": 41}),
+        {"horizon": 3, "rate_weight": 1e-3},
+        {"horizon": 4, "starts": 2, "restart_steps": 3, "iterations": 1, "recovery_steps": 2},
     ],
 )
-def test_nothing_is_left_behind(blocks_held, name, parameters):
+def test_nothing_is_left_behind(blocks_held, parameters):
     """Kernels that do not count references would lose those of arrays that others give them."""
-    policy = baselines.make(name, "varga7-fast", **parameters)
+    policy = baselines.make("rhc", "varga7-fast", **parameters)
     observation = shown(policy.preview)
     state = policy.predict(observation)[1]
     before = blocks_held()

@@ -106,31 +106,28 @@ def test_messages_name_a_class_without_a_name():
         baselines.make("looking", "zhang3-helix")._recall((1,), None, 1)
 
 
+class Unfinished(SolverPolicy):
+    """Solves nothing."""
+
+
 @pytest.mark.parametrize(
-    "place",
-    ["dls", "package.module:", ":Class", "a:b:c", "a b:C", 3],
+    ("name", "place", "message"),
+    [
+        *(
+            ("mine", place, r"expected 'package\.module:Class', got")
+            for place in ("dls", "package.module:", ":Class", "a:b:c", "a b:C", 3)
+        ),
+        *((name, Still, "expected a name of letters, digits") for name in ("", "a b", ".a", 3)),
+        *((name, Still, "is registered already") for name in ("dls", "agent")),
+        ("mine", dict, "expected a class derived from SolverPolicy"),
+        ("mine", Unfinished, "Unfinished': the class lacks solve"),
+    ],
 )
-def test_bad_places_are_refused_and_leave_nothing_behind(place):
-    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got"):
-        baselines.register("mine", place)
-    assert "mine" not in baselines.names()
-
-
-@pytest.mark.parametrize("name", ["", "a b", ".a", 3, "dls", "agent"])
-def test_bad_names_and_those_that_are_taken_are_refused(name):
-    with pytest.raises(InvalidInputError, match=r"expected a name of letters, digits|is registered already"):
-        baselines.register(name, Still)
-
-
-def test_classes_that_are_no_policies_are_refused_and_leave_nothing_behind():
-    class Unfinished(SolverPolicy):
-        pass
-
-    with pytest.raises(InvalidInputError, match="expected a class derived from SolverPolicy"):
-        baselines.register("mine", dict)
-    with pytest.raises(InvalidInputError, match="Unfinished': the class lacks solve"):
-        baselines.register("mine", Unfinished)
-    assert "mine" not in baselines.names()
+def test_what_is_refused_leaves_nothing_behind(name, place, message):
+    before = baselines.names()
+    with pytest.raises(InvalidInputError, match=message):
+        baselines.register(name, place)
+    assert baselines.names() == before
 
 
 @pytest.mark.parametrize(
@@ -155,17 +152,12 @@ def test_places_that_lead_nowhere(tmp_path, monkeypatch, content, message):
 
 
 def test_packages_of_others_bring_policies(entry_points):
-    entry_points(theirs=f"{__name__}:Still", extra=f"{__name__}:Misnamed [fast]")
+    entry_points(theirs=f"{__name__}:Still", extra=f"{__name__}:Misnamed [fast]", dls=f"{__name__}:Still")
     assert baselines.names()[-2:] == ("theirs", "extra")
     assert baselines.get("theirs").__name__ == "Still"
     assert evaluate("zhang3-helix", "theirs", steps=2)[0].policy == "theirs"
     assert baselines.get("extra").__name__ == "Misnamed"
-
-
-def test_names_of_ours_take_precedence_over_those_of_others(entry_points):
-    entry_points(dls=f"{__name__}:Still")
-    assert baselines.names().count("dls") == 1
-    assert baselines.get("dls") is DampedLeastSquares
+    assert baselines.get("dls") is DampedLeastSquares  # names of ours take precedence
 
 
 def test_a_bad_entry_point_takes_nobody_else_away(entry_points):

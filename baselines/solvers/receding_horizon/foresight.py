@@ -67,9 +67,8 @@ class RecedingHorizonForesight(RecedingHorizon):
         """Settles what depends on the arm."""
         seconds = AHEAD_AMONG_BODIES if self.among_bodies else AHEAD
         ahead = {"horizon": 1 + max(1, round(seconds / self.problem.dt))}
-        for name, value in (LIMITED | ahead if self.interior_point else FREE).items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
+        usual = LIMITED | ahead if self.interior_point else FREE
+        self._settle(**{name: value for name, value in usual.items() if getattr(self, name) is None})
         super().__post_init__()
 
     @property

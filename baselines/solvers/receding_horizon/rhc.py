@@ -1,12 +1,11 @@
 """Receding horizon, minimised to its optimum by Newton's method.
 
-Initial guesses and restart candidates are worth their time. Without one of them `rhc_foresight` costs so many times as
-much on 53 and 58 validation episodes of `varga7-pose-random` and `varga7-random` (geometric mean, 95 % interval):
-``restart_steps=0`` 1.10 (1.03 to 1.20) and 2.7 (1.7 to 4.8), ``starts=1`` 1.03 (1.01 to 1.05) and 1.10 (1.03 to 1.21).
-``start_steps=0`` costs 0.998 (0.996 to 0.9995) and 0.98 (0.94 to 1.01) times as much, but its first call takes 22 ms of
-CPU time instead of 0.8. ``recovery_steps=0`` costs 1.000 and 1.01 (1.00 to 1.04) times as much on the trajectory; from
-0.5 rad off it in all joints 36 of 48 episodes are back within 500 steps, instead of 48, at 2.9 (2.2 to 4.1) times the
-cost.
+Initial guesses and restart candidates are worth their time: without candidates (``restart_steps=0``) `rhc_foresight`
+costs 1.10 (1.03 to 1.20) times as much on 53 validation episodes of `varga7-pose-random` and 2.7 (1.7 to 4.8) times on
+58 of `varga7-random`, with one guess (``starts=1``) 1.03 (1.01 to 1.05) and 1.10 (1.03 to 1.21) times. All guesses in
+the first call (``start_steps=0``) cost as much as guesses spread over calls, but that call takes 22 ms of CPU time
+instead of 0.8. With ``recovery_steps`` 48 of 48 episodes that start 0.5 rad off in all joints are back on the
+trajectory within 500 steps, without 36.
 """
 
 from __future__ import annotations
@@ -133,24 +132,13 @@ class RecedingHorizon(CompiledPolicy):
             raise InvalidInputError(f"start_steps: expected 0 where restart_steps is 0, got {self.start_steps}.")
         knots = self._knots()
         knots.flags.writeable = False
-        object.__setattr__(self, "offsets", knots)
         problem, model = self.problem, self.problem.model
-        settings = PlanSettings(
-            knots,
-            self.terminal_weight,
-            self.stop_at_end,
-            -1 if self.iterations is None else self.iterations,
-            self.tolerance,
-            self.starts,
-            self.restart_steps,
-            self.seed,
-            self.start_steps,
-            self.recovery_steps,
-            self.rate_weight,
-            problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0),
-        )
+        change = problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0)
+        given = {name: getattr(self, name) for name in PlanSettings._fields if name in self.parameters}
+        given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
+        settings = PlanSettings(**given)
         numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))
-        object.__setattr__(self, "_numbers", numbers)
+        self._settle(offsets=knots, _numbers=numbers)
 
     @property
     def interior_point(self) -> bool:

@@ -37,15 +37,11 @@ def driven(which, name, pose, **parameters):
 
 
 @pytest.mark.parametrize(
-    ("name", "parameters"),
-    [("dls", {}), ("rhc", {"horizon": 8, "stop_at_end": True})],
-)
-@pytest.mark.parametrize(
-    "pose",
+    ("name", "parameters", "pose"),
     [
-        lambda which, q: which.task.coordinates(*which.arm.forward(q)),
-        lambda which, q: which.arm.forward(q),
-        lambda which, q: None,
+        ("dls", {}, lambda which, q: which.task.coordinates(*which.arm.forward(q))),
+        ("dls", {}, lambda which, q: which.arm.forward(q)),
+        ("rhc", {"horizon": 8, "stop_at_end": True}, lambda which, q: None),
     ],
     ids=["coordinates", "rotation and position", "of the model"],
 )
@@ -122,25 +118,18 @@ def test_what_has_a_wrong_shape_is_refused(arguments, message):
         perfect(scenario(), "rhc_gradient").step(*arguments)
 
 
-def test_who_may_control():
-    which = scenario()
-    with pytest.raises(UnknownNameError, match="Did you mean 'dls'"):
-        Controller(which, "dlss")
-    with pytest.raises(InvalidInputError, match="policy: expected 'name:parameter=value' or"):
-        Controller(which, 3)
-    with pytest.raises(InvalidInputError, match="privileged information on one episode: give its steps"):
-        Controller(which, "follow_nominal", Drives())
-    with pytest.raises(InvalidInputError, match="expected one that acts on what it sees, got the reference"):
-        Controller(which, "follow_nominal")
-    with pytest.raises(InvalidInputError, match="steps: expected a whole number of at least 1"):
-        Controller(which, "dls", steps=0)
-    with pytest.raises(InvalidInputError, match="expected one for 7 joints, the task 'skew' and Δt"):
-        Controller(which, baselines.make("dls", "panda-circle"))
-
-
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("make", "message"),
     [
+        (lambda: Controller("varga7-fast", "dlss"), "Did you mean 'dls'"),
+        (lambda: Controller("varga7-fast", 3), "policy: expected 'name:parameter=value' or"),
+        (lambda: Controller("varga7-fast", "follow_nominal", Drives()), "privileged information on one .*: give its"),
+        (lambda: Controller("varga7-fast", "follow_nominal"), "one that acts on what it sees, got the reference"),
+        (lambda: Controller("varga7-fast", "dls", steps=0), "steps: expected a whole number of at least 1"),
+        (
+            lambda: Controller("varga7-fast", baselines.make("dls", "panda-circle")),
+            "expected one for 7 joints, the task",
+        ),
         (lambda: Drives(-1), "delay: expected a whole number of at least 0, got -1"),
         (lambda: Drives(2, -0.02), "time_constant: expected a finite number from 0 to"),
         (lambda: Controller("varga7-fast", drives="known"), "drives: expected Drives.…. or 'identify', got 'known'"),
@@ -150,6 +139,6 @@ def test_who_may_control():
         (lambda: Guards(position_error=np.inf), "position_error: expected a finite number above 0, got inf"),
     ],
 )
-def test_drives_and_guards_that_cannot_be(change, message):
-    with pytest.raises(InvalidInputError, match=message):
-        change()
+def test_bad_input(make, message):
+    with pytest.raises((InvalidInputError, UnknownNameError), match=message):
+        make()

@@ -26,14 +26,15 @@ def poses(number):
     return arm.forward(np.random.default_rng(2).uniform(-1.0, 1.0, (number, 7)))
 
 
+@pytest.mark.parametrize("length", [1, LENGTH])
 @pytest.mark.parametrize("name", ikgym.tasks.names())
-def test_only_the_new_pose_is_converted(name, counted):
+def test_only_the_new_pose_is_converted(name, length, counted):
     task, (rotations, positions) = ikgym.tasks.get(name), poses(40)
     window, expected = Window(task), task.coordinates(rotations, positions)
-    for k in range(40 - LENGTH):
-        here = slice(k, k + LENGTH)
+    for k in range(40 - length):
+        here = slice(k, k + length)
         np.testing.assert_array_equal(window.ahead((rotations[here], positions[here])), expected[here])
-    assert counted == [LENGTH] + [1] * (39 - LENGTH)
+    assert counted == [length] + [1] * (39 - length)
 
 
 def test_the_newest_pose_comes_alone(counted):
@@ -57,14 +58,6 @@ def test_other_poses_are_all_converted(counted):
         np.testing.assert_array_equal(window.ahead(given), task.coordinates(*given))
     assert counted == [LENGTH, 1, LENGTH, LENGTH]  # the same poses again are not converted
     np.testing.assert_array_equal(window.ahead((rotations, positions)), task.coordinates(rotations, positions))
-
-
-def test_one_pose_ahead():
-    task, (rotations, positions) = ikgym.tasks.get("pose"), poses(3)
-    window = Window(task)
-    for k in range(3):
-        given = rotations[k : k + 1], positions[k : k + 1]
-        np.testing.assert_array_equal(window.ahead(given), task.coordinates(*given))
 
 
 def test_poses_that_are_no_numbers_stay_so():

@@ -1,5 +1,6 @@
 """Receding horizons among bodies: nothing touches, and what is observed of obstacles counts."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -24,6 +25,7 @@ def between(q):
     return np.concatenate([before + shares * (after - before) for before, after in itertools.pairwise(q)])
 
 
+@functools.cache
 def elbow_obstacle():
     """A motion of the Panda, and a ball in the way of its elbow that the null space keeps clear of."""
     scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
@@ -53,6 +55,7 @@ def test_a_ball_in_the_way_is_not_touched(name, parameters):
         assert total(episode) > free
 
 
+@pytest.mark.slow
 def test_drawn_boxes_are_kept_clear_of():
     """Episode 10 of 1,000 steps, in which what looks at no bodies goes 14 mm into one."""
     boxes = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.05] * 3, [0.25] * 3, 10, 0.02, 0.1)
@@ -66,6 +69,7 @@ def test_drawn_boxes_are_kept_clear_of():
     assert total(clear) < 1.05 * total(touching)
 
 
+@pytest.mark.slow
 def test_a_rod_passes_the_elbow():
     """The side on which it passes is chosen long before: with 1.5 s ahead it ends 13 mm off the path."""
     scenario = ikgym.scenarios.get("panda-hand")

@@ -60,31 +60,13 @@ def test_the_first_call_takes_less_than_three_ordinary_ones():
     assert 2 < made[0] < 3 * usual
     assert made[1] <= 3 * usual
     assert made[2:].max() <= 6 * usual
+    # Less than 1 % of 3,000 periods are longer than others; where a guess is made the plan has one step.
+    assert (made > 2).sum() <= 25
+    assert set(made[40:]) == {1, 2}
     assert iterations(60, start_steps=0)[0] > 50 * usual
 
 
-def test_few_periods_are_longer_than_others():
-    """Less than 1 % of 3,000. Behind the first guesses there are two Newton steps, or one where a guess is made."""
-    made = iterations(120)
-    assert (made > 2).sum() <= 25
-    assert (made[40:] <= 2).all()
-    assert (made[40:] == 1).any()
-
-
-def long_costs(seeds, **parameters):
-    scenario = ikgym.scenarios.get("varga7-pose-random-long")
-    episodes = rollouts(scenario, baselines.make("rhc_foresight", scenario, **parameters), seeds)
-    return np.array([float((e.tracking_cost + e.velocity_cost).sum()) for e in episodes])
-
-
-def test_1500_steps_of_foresight_are_too_few_in_a_long_episode():
-    """How the arm moves in its null space from the first step on decides what the last 300 of 3,000 steps cost."""
-    assert 2.0 * long_costs([1_000_038]) < long_costs([1_000_038], horizon=1501, move_blocks=57)
-
-
-@pytest.mark.parametrize(
-    ("horizon", "knots"), [(2, 1), (31, 7), (101, 11), (301, 19), (1001, 33), (1501, 40), (3001, 56)]
-)
+@pytest.mark.parametrize(("horizon", "knots"), [(2, 1), (101, 11), (3001, 56)])
 def test_knots_of_each_horizon(horizon, knots):
     """The same up to the horizon, whatever it is, and none farther apart than a third of an oscillation of 3 Hz."""
     policy = baselines.make("rhc_foresight", SCENARIO, horizon=horizon)

@@ -43,9 +43,8 @@ def printed(scenario, q, nominal, qdot, alpha, alpha_max, steps):
         qdot = qdot - alpha * gradient
 
 
-@pytest.mark.parametrize("alpha_start", ["restart", "kept"])
-@pytest.mark.parametrize("warm_start", ["unshifted", "shifted"])
-@pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow", "zhang6-lspb"])
+@pytest.mark.parametrize(("alpha_start", "warm_start"), [("restart", "unshifted"), ("kept", "shifted")])
+@pytest.mark.parametrize("name", ["varga7-literal-slow", "zhang6-lspb"])
 def test_follows_the_printed_descent(name, warm_start, alpha_start):
     scenario = ikgym.scenarios.get(name).replace(steps=12)
     policy = baselines.make("rhc_gradient", scenario, iterations=8, warm_start=warm_start, alpha_start=alpha_start)
@@ -67,13 +66,12 @@ def test_follows_the_printed_descent(name, warm_start, alpha_start):
 
 
 @pytest.mark.parametrize("name", ONE_OF_EACH)
-@pytest.mark.parametrize("steps", [1, 5])
-def test_gradients_against_central_differences(name, steps):
+def test_gradients_against_central_differences(name):
     scenario = ikgym.scenarios.get(name)
-    model, rng = scenario.model, np.random.default_rng(steps)
+    model, rng = scenario.model, np.random.default_rng(5)
     q = rng.uniform(-1, 1, scenario.joints)
-    nominal = scenario.task.coordinates(*model.forward(q + rng.uniform(-5e-3, 5e-3, (steps, scenario.joints))))
-    qdot = rng.uniform(-2, 2, (steps, scenario.joints))
+    nominal = scenario.task.coordinates(*model.forward(q + rng.uniform(-5e-3, 5e-3, (5, scenario.joints))))
+    qdot = rng.uniform(-2, 2, (5, scenario.joints))
     common = (data_of(scenario), q, nominal)
     analytic, forward = np.empty_like(qdot), np.empty_like(qdot)
     value = analytic_gradient(*common, qdot, analytic)
@@ -95,7 +93,6 @@ def test_gradients_against_central_differences(name, steps):
     [
         ("kept", "unshifted", "varga7-fast", 100),
         pytest.param("restart", "shifted", "varga7-fast", 1300, marks=pytest.mark.slow),
-        ("kept", "unshifted", "varga7-literal-fast", 150),
         ("restart", "shifted", "varga7-literal-fast", 220),
         pytest.param("restart", "unshifted", "varga7-literal-fast", 2000, marks=pytest.mark.slow),
     ],

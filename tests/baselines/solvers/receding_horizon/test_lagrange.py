@@ -15,7 +15,6 @@ from baselines.solvers.receding_horizon.horizon import (
 from baselines.solvers.receding_horizon.lagrange import factorise, reduce_gradient
 from baselines.status import Status
 from tests.baselines.solvers.receding_horizon.data import constraints, data_of, problem
-from tests.every_scenario import ONE_OF_EACH
 
 
 def gradients(kind, scenario, q, nominal, qdot):
@@ -37,19 +36,8 @@ KINDS = pytest.mark.parametrize("kind", ["analytic", "finite_difference"])
 
 
 @KINDS
-@pytest.mark.parametrize("stages", [5])
-@pytest.mark.parametrize("name", ONE_OF_EACH)
-def test_states_eliminated_is_the_plain_gradient(name, stages, kind):
-    """dΦ/dq̇(i) = ∂Φ/∂q̇(i) + Δt Σ_{k>i} ∂Φ/∂q(k), for differences as well."""
-    scenario, q, nominal, qdot = problem(name, stages)
-    by_q, by_qdot, plain = gradients(kind, scenario, q, nominal, qdot)
-    eliminated = by_qdot + scenario.dt * np.cumsum(by_q[::-1], axis=0)[::-1]
-    np.testing.assert_allclose(eliminated, plain, atol=1e-6 * max(abs(plain).max(), 1.0))
-
-
-@KINDS
 @pytest.mark.parametrize("stages", [1, 20])
-@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix"])
+@pytest.mark.parametrize("name", ["varga7-fast", "zhang3-helix", "khan8-q1", "zhang6-lspb"])
 def test_reduced_gradient(name, stages, kind):
     """Against eq. 4 with multipliers by least squares, and against the plain gradient preconditioned."""
     scenario, q, nominal, qdot = problem(name, stages)
@@ -86,27 +74,24 @@ def run(name, steps, **parameters):
 def test_follows_the_plain_method_on_the_papers_trajectory(kind):
     """To the order Δt² HL² in each iterate; iterations are the same in number."""
     common = {"gradient": kind, "alpha_start": "kept", "alpha_max": 1e-4}
-    plain, reduced = (run(name, 600, **common) for name in ("rhc_gradient", "rhc_lagrange"))
+    plain, reduced = (run(name, 300, **common) for name in ("rhc_gradient", "rhc_lagrange"))
     np.testing.assert_array_equal(plain.iterations, reduced.iterations)
     np.testing.assert_array_equal(plain.status, reduced.status)
     np.testing.assert_allclose(plain.qdot, reduced.qdot, atol=2e-5)
     assert not np.array_equal(plain.qdot, reduced.qdot)
 
 
-@pytest.mark.parametrize("states", [False, True])
-@KINDS
-def test_costs_are_those_of_the_plain_method(kind, states):
+def test_costs_with_task_coordinates_are_those_of_the_plain_method():
     """As printed, with α restarted: the paths separate for a while, the costs do not."""
-    plain = run("rhc_gradient", 300, gradient=kind)
-    reduced = run("rhc_lagrange", 300, gradient=kind, states=states)
+    plain = run("rhc_gradient", 300, gradient="analytic")
+    reduced = run("rhc_lagrange", 300, gradient="analytic", states=True)
     cost, wanted = (float((e.tracking_cost + e.velocity_cost).sum()) for e in (reduced, plain))
     assert cost == pytest.approx(wanted, rel=3e-3)
     assert set(reduced.status) == {Status.CONVERGED}
     assert np.mean(reduced.iterations) == pytest.approx(np.mean(plain.iterations), rel=0.05)
 
 
-@pytest.mark.parametrize("states", [False, True])
-def test_diverges_as_printed_with_alpha_kept_and_says_so(states):
-    episode = run("rhc_lagrange", 150, alpha_start="kept", states=states)
+def test_diverges_as_printed_with_alpha_kept_and_says_so():
+    episode = run("rhc_lagrange", 150, alpha_start="kept")
     assert Status.DIVERGED in episode.status
     assert np.isfinite(episode.qdot).all()

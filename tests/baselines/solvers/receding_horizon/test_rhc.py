@@ -1,7 +1,6 @@
 """The receding horizon against IPOPT and gradient descent, its limits, and what it does along episodes."""
 
 import dataclasses
-import functools
 
 import gymnasium as gym
 import numpy as np
@@ -9,12 +8,12 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.episodes import rollout
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from tests.comparison import identical
 
-VARGA = ["varga7-fast", "varga7-slow", "varga7-literal-fast", "varga7-literal-slow"]
 # The policy stops at 1e-7 of the cost, IPOPT at 1e-10 of its optimality; below costs of 1e-3 an absolute 1e-9 counts.
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
 FAR = 10**6
@@ -104,13 +103,13 @@ def check_against_ipopt(name, horizon, count, **parameters):
 
 @pytest.mark.parametrize("name", ["varga7-fast", "varga7-literal-slow"])
 def test_plans_are_as_cheap_as_ipopts(name):
-    check_against_ipopt(name, 10, 4)
+    check_against_ipopt(name, 10, 2)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "horizon"), list(zip(VARGA, (3, 10, 30, 30), strict=True)))
-def test_plans_are_as_cheap_as_ipopts_at_many_states(name, horizon):
-    check_against_ipopt(name, horizon, 20 if horizon < 30 else 8)  # of each of four kinds
+@pytest.mark.parametrize(("name", "horizon", "count"), [("varga7-slow", 3, 12), ("varga7-literal-fast", 30, 6)])
+def test_plans_are_as_cheap_as_ipopts_at_many_states(name, horizon, count):
+    check_against_ipopt(name, horizon, count)
 
 
 @pytest.mark.parametrize(
@@ -133,18 +132,12 @@ def test_other_arms_and_tasks(name, horizon, count):
 
 
 @pytest.mark.parametrize(
-    "parameters",
-    [
-        {"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0},
-        {"horizon": 9, "terminal_weight": 0.0},
-        pytest.param({"horizon": 8, "move_blocks": 1}, marks=pytest.mark.slow),
-        pytest.param({"horizon": 101, "move_blocks": 12}, marks=pytest.mark.slow),
-    ],
+    "parameters", [{"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0}, {"horizon": 9, "terminal_weight": 0.0}]
 )
 def test_blocked_and_weighted_horizons(parameters):
     scenario = ikgym.scenarios.get("varga7-fast")
     policy = baselines.make("rhc", scenario, **parameters)
-    q, nominal = states_near(scenario, policy.preview, 3, 1e-2)
+    q, nominal = states_near(scenario, policy.preview, 2, 1e-2)
     costs, horizons, plans, state = planned(policy, q, nominal)
     assert set(policy.report(state).status) == {Status.CONVERGED}
     compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
@@ -167,20 +160,6 @@ def test_the_horizon_ends_with_the_episode(left, blocks):
         assert identical(*answers) == ends
 
 
-def test_what_is_left_of_the_last_plan_is_optimal():
-    """Bellman: where the horizon ends with the episode, a step along the plan leaves nothing to be done."""
-    scenario = ikgym.scenarios.get("varga7-fast")
-    policy = baselines.make("rhc", scenario, horizon=15, stop_at_end=True, tolerance=1e-9)
-    q, nominal = states_near(scenario, 20, 5, 1e-2)
-    _, state = policy.predict(observe(policy.problem, q, nominal, remaining=16))
-    for passed, left in enumerate(range(15, 0, -1), start=1):
-        ahead = np.pad(nominal[:, passed:], ((0, 0), (0, 15), (0, 0)))  # zeros where nothing looks any more
-        view = observe(policy.problem, policy.plan(state)[:, 0], ahead, remaining=left)
-        _, state = policy.predict(view, state)
-        if left < 14:
-            assert policy.report(state).iterations.max() == 0
-
-
 def limited(name, speed=20.0, share=0.0):
     """A scenario with slow joints, or with joint limits inside the range of its nominal joint path."""
     scenario = ikgym.scenarios.get(name).replace(velocity_limit=speed)
@@ -198,13 +177,12 @@ def limited(name, speed=20.0, share=0.0):
         (limited("varga7-fast", speed=5.0), 10, 1e-2),
         (limited("varga7-fast", share=0.1), 6, 1e-2),
         pytest.param(limited("varga7-fast", speed=20.0), 3, 1e-1, marks=pytest.mark.slow),
-        pytest.param(limited("varga7-slow", speed=1.0), 6, 5e-3, marks=pytest.mark.slow),
     ],
-    ids=["slow joints", "joint limits", "far away", "slow trajectory"],
+    ids=["slow joints", "joint limits", "far away"],
 )
 def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
     policy = baselines.make("rhc", scenario, horizon=horizon)
-    q, nominal = states_near(scenario, horizon - 1, 12, far, seed=3)
+    q, nominal = states_near(scenario, horizon - 1, 8, far, seed=3)
     lower, upper = policy.problem.model.lower, policy.problem.model.upper
     q = np.clip(q, lower, upper)
     costs, horizons, plans, _ = planned(policy, q, nominal)
@@ -223,11 +201,10 @@ def test_limits_are_kept_and_agree_with_ipopt(scenario, horizon, far):
         best = solver.solve(state, plan)
         compared += best.converged
         assert cost == pytest.approx(best.cost, rel=RELATIVE, abs=ABSOLUTE) or not best.converged
-    assert compared >= 6
+    assert compared >= 4
 
 
-@pytest.mark.parametrize("iterations", [None, 1])
-@pytest.mark.parametrize("share", [0.0, 0.1])
+@pytest.mark.parametrize(("iterations", "share"), [(None, 0.1), (1, 0.0)])
 def test_an_episode_stays_within_its_limits(iterations, share):
     scenario = limited("varga7-fast", speed=4.0, share=share).replace(steps=150)
     policy = baselines.make("rhc", scenario, horizon=8, iterations=iterations)
@@ -235,7 +212,6 @@ def test_an_episode_stays_within_its_limits(iterations, share):
     observation, _ = env.reset()
     state, lower, upper = None, scenario.arm.lower - 1e-6, scenario.arm.upper + 1e-6
     inside = np.all((observation["q"] >= lower) & (observation["q"] <= upper))
-    pressed = False
     for _ in range(150):
         action, state = policy.predict(observation, state)
         assert action in env.action_space
@@ -243,34 +219,19 @@ def test_an_episode_stays_within_its_limits(iterations, share):
         within = bool(np.all((observation["q"] >= lower) & (observation["q"] <= upper)))
         assert within or not inside  # the nominal start may lie outside
         inside = inside or within
-        pressed |= bool((abs(action) > 0.999).any())
     assert inside
-    assert pressed or share > 0.0
 
 
-@functools.cache
-def episode(name, policy="rhc", steps=3000, **parameters):
-    """Total cost, Newton steps and statuses of an episode."""
-    scenario = ikgym.scenarios.get(name).replace(steps=steps)
-    policy = baselines.make(policy, scenario, **parameters)
-    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
-    observation, _ = env.reset()
-    total, state, made, statuses = 0.0, None, [], set()
-    for _ in range(steps):
-        action, state = policy.predict(observation, state)
-        observation, reward, *_ = env.step(action)
-        total -= float(reward)
-        made.append(int(policy.report(state).iterations[0]))
-        statuses.add(int(policy.report(state).status[0]))
-    return total, made, statuses
+def total(episode):
+    return float((episode.tracking_cost + episode.velocity_cost).sum())
 
 
 def test_one_newton_step_a_period_is_nearly_the_optimum():
-    converged, _, statuses = episode("varga7-fast", steps=800)
-    quick, made, _ = episode("varga7-fast", steps=800, iterations=1)
-    assert quick == pytest.approx(converged, rel=0.01)
-    assert statuses == {Status.CONVERGED}
-    assert set(made[1:]) == {1}
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=800)
+    whole, quick = (rollout(scenario, baselines.make("rhc", scenario, iterations=n), 0) for n in (None, 1))
+    assert total(quick) == pytest.approx(total(whole), rel=0.01)
+    assert set(whole.status) == {Status.CONVERGED}
+    assert set(quick.iterations[1:]) == {1}
 
 
 RESTARTED = {"horizon": 40, "iterations": 1, "move_blocks": 12, "starts": 4, "restart_steps": 5}
@@ -286,9 +247,7 @@ def pushed(policy):
         yield observe(policy.problem, q, ahead, remaining=60 - k), np.array([k == 0, k % 7 == 0, k == 11])
 
 
-@pytest.mark.parametrize(
-    "more", [{}, {"stop_at_end": True}, {"iterations": None}, {"start_steps": 4}, {"recovery_steps": 3}]
-)
+@pytest.mark.parametrize("more", [{"stop_at_end": True}, {"iterations": None}, {"start_steps": 4, "recovery_steps": 3}])
 def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(more):
     policy = baselines.make("rhc", "varga7-fast", **{**RESTARTED, **more})
     states, batched = [None] * 3, None
@@ -303,13 +262,13 @@ def test_rows_of_a_batch_are_single_calls_with_restart_candidates_and_starts(mor
     assert (policy.report(batched).iterations > 1).all()  # restart candidates among them
 
 
-@pytest.mark.parametrize(("change", "same"), [({}, True), ({"seed": 1}, False)])
-def test_seeds(change, same):
+def test_seeds():
+    scenario = ikgym.scenarios.get("varga7-fast").replace(steps=60)
     base = {"horizon": 200, "move_blocks": 16, "starts": 6, "start_steps": 0}
-    first, second = (episode("varga7-fast", "rhc_foresight", steps=60, **base, **c) for c in ({}, change))
-    episode.cache_clear()
-    assert (episode("varga7-fast", "rhc_foresight", steps=60, **base, **change) == second) is True
-    assert (first == second) == same
+    policies = [baselines.make("rhc_foresight", scenario, **base, seed=seed) for seed in (0, 0, 1)]
+    first, again, other = (rollout(scenario, policy, 0).q for policy in policies)
+    assert identical(first, again)
+    assert not identical(first, other)
 
 
 def test_nothing_finite_gives_a_nan():
@@ -333,10 +292,8 @@ def test_nothing_finite_gives_a_nan():
 def test_status_and_iterations_are_said():
     scenario = ikgym.scenarios.get("varga7-fast")
     q, nominal = states_near(scenario, 29, 1, 1e-2)
-    for parameters, wanted in (({}, Status.CONVERGED), ({"iterations": 1, "starts": 1}, Status.CONVERGED)):
-        policy = baselines.make("rhc", scenario, **parameters)
-        _, state = policy.predict(observe(policy.problem, q, nominal))
-        assert policy.report(state).status[0] == wanted  # the first plan of all is given its time
+    policy = baselines.make("rhc", scenario, iterations=1)
+    _, state = policy.predict(observe(policy.problem, q, nominal))
+    assert policy.report(state).status[0] == Status.CONVERGED  # the first plan of all is given its time
     _, state = policy.predict(observe(policy.problem, q + 0.01, nominal), state)
-    assert policy.report(state).status[0] == Status.ITERATION_LIMIT
-    assert policy.report(state).iterations[0] == 1
+    assert policy.report(state) == (Status.ITERATION_LIMIT, 1)

@@ -5,15 +5,10 @@ import pytest
 
 import ikgym
 from baselines.solvers.receding_horizon.newton.cost import true_cost
-from baselines.solvers.receding_horizon.newton.grid import Grid
-from baselines.solvers.receding_horizon.newton.second_order import second_order
-from baselines.solvers.receding_horizon.newton.workspace import PathProblem, knot_workspace
-from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.kinematics import forward, forward_and_jacobian
 from tests.baselines.solvers.receding_horizon.data import horizon_cost
 from tests.baselines.solvers.receding_horizon.newton.problems import place
 
-ARMS = ["varga7", "varga7_literal", "khan8", "zhang3", "puma560", "faitli3"]
+ARMS = ["varga7_literal", "tiago", "zhang3"]
 TASKS = ikgym.tasks.names()
 
 
@@ -26,14 +21,16 @@ def symmetric(lower):
     return np.tril(lower) + np.swapaxes(np.tril(lower, -1), -1, -2)
 
 
-def dense(blocks, second=True):
-    """The Hessian of the blocks. Shape (K n, K n)."""
+def dense(blocks, second=True, far=False):
+    """The Hessian of the blocks, with those two away from the diagonal where they count. Shape (K n, K n)."""
     knots, n = blocks.gradient.shape
     out = np.zeros((knots, n, knots, n))
     for k in range(knots):
         out[k, :, k] = symmetric(blocks.diagonal[k]) + (symmetric(blocks.second[k]) if second else 0.0)
         if k > 0:
             out[k, :, k - 1] = out[k - 1, :, k] = -np.diag(blocks.coupling[k])
+        if far and k > 1:
+            out[k, :, k - 2] = out[k - 2, :, k] = np.diag(blocks.far[k])
     return out.reshape(knots * n, knots * n)
 
 
@@ -67,30 +64,6 @@ def busy(arm, task, home):
     """A place of which no term is idle; the first one drawn, as a rule."""
     places = (place(arm, task, seed=seed, home=home, delta_x=scale_of(task)) for seed in range(50))
     return next(at for at in places if everything_plays(at))
-
-
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("arm", ARMS)
-def test_second_derivatives_of_the_error_alone(arm, task):
-    """Of any weighted sum of its components; a pose has reached its orientation, and is anywhere else."""
-    arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(0)
-    n, workspace = arm.joints, knot_workspace(task.kind, task.size, arm.joints)
-    workspace.gradient[:] = rng.normal(size=task.error_size)
-    for q in (np.zeros(n), *rng.uniform(-2.0, 2.0, (2, n))):
-        nominal = task.coordinates(*arm.forward(q))
-        nominal[-3:] += rng.normal(size=3)
-
-        def weighted(here, nominal=nominal):
-            forward(arm.chain, here, workspace.rotation, workspace.position)
-            task_kernels.coordinates(task.kind, workspace.rotation, workspace.position, workspace.pose)
-            task_kernels.error(task.kind, nominal, workspace.pose, workspace.error)
-            return workspace.gradient @ workspace.error
-
-        central = differences(lambda a, q=q: differences(weighted, a, 1e-3), q, 1e-3)
-        out = np.empty((n, n))
-        forward_and_jacobian(arm.chain, q, workspace.rotation, workspace.position, workspace.geometric)
-        second_order(task.kind, workspace, out)
-        np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -129,35 +102,3 @@ def test_true_cost_is_that_of_the_horizon(arm, task):
     mine = true_cost(at.problem, at.path, at.workspace)
     assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
     assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_true_cost_is_the_weighted_sum_over_knots_and_blocks(task):
-    at = place("varga7", task, limits=False)
-    cost, grid, start = at.data.cost, at.grid, at.start
-    total = 0.0
-    for k, here in enumerate(at.path):
-        alone = Grid(np.ones(1, np.int64), np.ones(1), np.ones(1), np.ones(1))
-        velocity = (here - start) / (grid.length[k] * at.data.dt)
-        # A single knot one step from the one before costs Φ^X + Φ^U; standing still, Φ^X alone.
-        nominal = at.nominal[grid.at[k] - 1 : grid.at[k]]
-        tracking = true_cost(PathProblem(at.data, alone, here, nominal), here[None], at.workspace)
-        total += grid.tracking[k] * tracking + grid.velocity[k] * float(np.sum((velocity / cost.delta_qdot) ** 4))
-        start = here
-    assert true_cost(at.problem, at.path, at.workspace) == pytest.approx(total, rel=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_the_merit_never_exceeds_the_cost_and_says_what_it_lacks(seed):
-    """Without limits it is a lower bound, whatever the multipliers, and reaches the cost as they are brought up."""
-    at = place("varga7", "skew", seed=seed, limits=False)
-    for _ in range(4):
-        (value, true, gap), _ = at.linearise()
-        assert value <= true
-        assert gap >= 0.0
-        at.linearise(advance=True)
-    # Off a kink the multipliers end at 0 or at its steepness.
-    (value, true, gap), _ = at.linearise()
-    assert value == pytest.approx(true, rel=1e-12)
-    assert gap == 0.0
-    assert set(abs(at.multipliers[:, : at.error_size]).ravel()) <= {0.0, 1.0}

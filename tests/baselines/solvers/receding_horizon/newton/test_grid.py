@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from baselines.solvers.receding_horizon.newton.grid import (
@@ -16,6 +16,7 @@ from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 horizons = st.integers(1, 3000).flatmap(lambda steps: st.tuples(st.just(steps), st.integers(1, steps)))
 
 
+@settings(max_examples=40)
 @given(horizons)
 def test_offsets_rise_to_the_end_by_growing_blocks(horizon):
     steps, blocks = horizon
@@ -58,6 +59,7 @@ def by_hand(at):
     return weights
 
 
+@settings(max_examples=40)
 @given(horizons, st.integers(1, 4000), st.sampled_from([0.0, 1.0, 2.5]))
 def test_cut(horizon, left, terminal):
     whole = offsets(*horizon)
@@ -78,6 +80,7 @@ def slid(old, path, new, passed=None):
     return out
 
 
+@settings(max_examples=40)
 @given(horizons.filter(lambda h: h[1] > 1), st.integers(0, 2**31))
 def test_a_slid_path_is_the_old_one_a_step_later(horizon, seed):
     old = grid_of(offsets(*horizon))

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from baselines.solvers.receding_horizon.newton import barrier as limited
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit, true_cost
 from tests.baselines.solvers.receding_horizon.newton.problems import place
-from tests.baselines.solvers.receding_horizon.newton.test_barrier import BARRIER
-from tests.baselines.solvers.receding_horizon.newton.test_barrier import place as limited_place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
 
 PAYLOAD = np.linspace(1e-3, 2e-3, 7)
@@ -32,12 +29,3 @@ def test_the_gradient_with_a_payload_on_the_way():
     central = differences(lambda x: merit(problem, x, at.multipliers, workspace), at.path, 1e-8)
     got = workspace.model.gradient.ravel()
     np.testing.assert_allclose(got, central, atol=1e-4 * abs(central).max())
-
-
-def test_the_gradient_within_limits_of_acceleration():
-    problem, path, workspace = limited_place()
-    problem = problem._replace(load=from_knot(2))
-    limited.linearise(problem, path, BARRIER, limited.ANEW, False, workspace)
-    central = differences(lambda x: limited.merit(problem, x, BARRIER, workspace), path, 1e-8)
-    got = workspace.model.gradient.ravel()
-    np.testing.assert_allclose(got, central, atol=1e-5 * abs(central).max())

@@ -9,7 +9,7 @@ import ikgym
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings, minimise
-from baselines.solvers.receding_horizon.newton.newton_step import newton_step
+from baselines.solvers.receding_horizon.newton.newton_step import newton_step, pentadiagonal_step
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from ikgym import TrackingCost
 from ikgym.arms import Arm
@@ -33,20 +33,21 @@ def random_blocks(knots, n, rng, convex=True):
     return blocks
 
 
-def step_of(blocks, exact, damping):
+def step_of(blocks, exact, damping, solve=newton_step):
     knots, n = blocks.gradient.shape
     inverse, factor, step = np.empty((knots, n, n)), np.empty((n, n)), np.empty((knots, n))
-    return newton_step(blocks, exact, damping, inverse, factor, step), step
+    return solve(blocks, exact, damping, inverse, factor, step), step
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.7])
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize(("knots", "n"), [(1, 1), (2, 3), (30, 8)])
-def test_step_against_a_dense_solve(knots, n, exact, damping):
+@pytest.mark.parametrize("solve", [newton_step, pentadiagonal_step])
+@pytest.mark.parametrize(("exact", "damping"), [(False, 0.0), (True, 0.7)])
+@pytest.mark.parametrize(("knots", "n"), [(1, 7), (2, 3), (3, 2), (30, 8)])
+def test_step_against_a_dense_solve(knots, n, exact, damping, solve):
     blocks = random_blocks(knots, n, np.random.default_rng(knots))
-    good, step = step_of(blocks, exact, damping)
+    blocks.far[:] = np.random.default_rng(0).uniform(-0.4, 0.4, (knots, n))
+    good, step = step_of(blocks, exact, damping, solve)
     assert good
-    matrix = dense(blocks, second=exact) + damping * np.eye(knots * n)
+    matrix = dense(blocks, second=exact, far=solve is pentadiagonal_step) + damping * np.eye(knots * n)
     np.testing.assert_allclose(step.ravel(), np.linalg.solve(matrix, -blocks.gradient.ravel()), atol=1e-11)
 
 
