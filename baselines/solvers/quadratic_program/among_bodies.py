@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import dot
+from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances
 from baselines.solvers.quadratic_program.program import held_back, left_over, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
@@ -15,7 +15,7 @@ from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.limits import FASTEST, LOWER, UPPER
-from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.linear_algebra import cholesky
 from ikgym.validation import FloatArray
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
@@ -78,22 +78,25 @@ def largest_approach(distance, clearance, dt, change, share):
     return min(share * room, braking_speed(room, change)) if room >= 0.0 else RETREAT * room
 
 
-@inner
-def aside(factor, weight, gradient, motion):
-    """A gradient in the joint motions that leave the task alone, w H⁻¹ ∇d, and how much it changes the distance by.
+@inlined
+def aside(projection, gradient, motion):
+    """A gradient in the joint motions that leave the task alone, P ∇d, and how much it changes the distance by.
 
     Args:
-        factor: L of H = (J Δt)ᵀ J Δt + w I = L Lᵀ. Shape (n, n).
-        weight: w.
-        gradient: ∇d. Shape (n,).
-        motion: Receives w H⁻¹ ∇d. Shape (n,).
+        projection: P = w H⁻¹ of H = (J Δt)ᵀ J Δt + w I. Shape (n, n).
+        gradient: ∇d; many joints do not change a distance. Shape (n,).
+        motion: Receives P ∇d. Shape (n,).
 
     Returns:
-        w ∇dᵀ H⁻¹ ∇d, at most ‖∇d‖².
+        ∇dᵀ P ∇d, at most ‖∇d‖².
     """
-    motion[:] = gradient
-    cholesky_solve(factor, motion)
-    motion *= weight
+    n = gradient.shape[0]
+    for j in range(n):
+        motion[j] = 0.0
+    for k in range(n):
+        if gradient[k] != 0.0:
+            for j in range(n):
+                motion[j] += projection[k, j] * gradient[k]
     return dot(motion, gradient)
 
 
@@ -125,9 +128,12 @@ def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
     """
     (count, distances, reaches, gradients), dt = near, model.dt
     n, braking = velocity.shape[0], numbers.limits[BRAKING]
-    factor, motion = hessian[:n, :n].copy(), np.empty(n)
+    factor, projection, motion = hessian[:n, :n].copy(), np.empty((n, n)), np.empty(n)
     velocity[:], nearest = 0.0, 1.0
     usable = count > 0 and cholesky(factor)
+    if usable:
+        inverse_of_factor(factor, projection)
+        projection *= weight
     for i in range(count):
         change, square = 0.0, 0.0
         for j in range(n):
@@ -137,7 +143,7 @@ def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
         bounds[i] = -np.inf
         if change == 0.0 or not usable:
             continue
-        lever = aside(factor, weight, gradients[i], motion)
+        lever = aside(projection, gradients[i], motion)
         part = lever / (ASIDE * square)
         share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
         bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
