@@ -89,7 +89,7 @@ def path_step(model, numbers, seen, memory, answer):
         weight = motion_weight(jac, missing, program.damping, program.lm_damping, limits[FASTEST])
         curvature(jac, SCALING_WEIGHT * weight, hessian)
         if program.braking_share > 0.0:
-            missing *= feedback_share(hessian, jac, missing, program.braking_share * limits[CHANGE])
+            missing *= feedback_share(hessian, jac, missing, program.braking_share, limits[CHANGE])
         least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
         goals = SCALING_WEIGHT * weight, preferred, speed, least
         made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)

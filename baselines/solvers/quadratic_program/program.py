@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.kernels.tasks import AXIS, POSE
@@ -20,7 +20,7 @@ SCALING_WEIGHT = 1e-2
 TAKEN_ON, STILL = 1e-5, 1e-9
 
 
-@inner
+@uncounted
 def weigh_rotation(kind, weight, jacobian, motion, error):
     """Multiplies the rows of rotation by their weight against those of position.
 
@@ -40,7 +40,7 @@ def weigh_rotation(kind, weight, jacobian, motion, error):
             jacobian[a, j] *= weight
 
 
-@inner
+@uncounted
 def motion_weight(jacobian, error, damping, lm_damping, fastest):
     """Weights of the squares of the joint velocities against those of the task shift.
 
@@ -62,7 +62,7 @@ def motion_weight(jacobian, error, damping, lm_damping, fastest):
     return damping * columns / n + lm_damping * square / (most * most)
 
 
-@kernel
+@uncounted
 def curvature(jacobian, weight, hessian):
     """H = (J Δt)ᵀ J Δt + weight · I, in the upper left corner: shapes (e, n), a number, (n, n) or more."""
     e, n = jacobian.shape
@@ -76,7 +76,7 @@ def curvature(jacobian, weight, hessian):
 
 
 @inner
-def feedback_share(hessian, jacobian, error, change):
+def feedback_share(hessian, jacobian, error, part, changes):
     """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
 
     What a joint moves too fast for that, all of them are slowed down by, which keeps the direction.
@@ -85,7 +85,8 @@ def feedback_share(hessian, jacobian, error, change):
         hessian: H, see :func:`curvature`.
         jacobian: J Δt. Shape (e, n).
         error: The error to be corrected. Shape (e,).
-        change: The changes of the velocity in one step to reckon with, in [rad/s] or [m/s]. Shape (n,).
+        part: The share of the changes that is reckoned with.
+        changes: Largest changes of the velocity in one step, in [rad/s] or [m/s]. Shape (n,).
     """
     n = jacobian.shape[1]
     factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
@@ -97,13 +98,13 @@ def feedback_share(hessian, jacobian, error, change):
         return share
     cholesky_solve(factor, qdot)
     for j in range(n):
-        speed = abs(qdot[j])
-        if speed > change[j]:
-            share = min(share, braking_speed(speed, change[j]) / speed)
+        speed, change = abs(qdot[j]), part * changes[j]
+        if speed > change:
+            share = min(share, braking_speed(speed, change) / speed)
     return share
 
 
-@kernel
+@uncounted
 def goal(jacobian, shift, weight, preferred, linear):
     """The vector g = (J Δt)ᵀ Δx + weight · preferred velocities: shapes (e, n), (e,), a number, (n,), (n,)."""
     e, n = jacobian.shape
@@ -113,7 +114,7 @@ def goal(jacobian, shift, weight, preferred, linear):
             linear[j] += jacobian[a, j] * shift[a]
 
 
-@inner
+@uncounted
 def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
@@ -144,7 +145,7 @@ def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
     return length
 
 
-@inner
+@uncounted
 def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear):
     """The same where the task shift is s Δx + e, with the motion Δx along a path and a speed s that is aimed at.
 
@@ -181,7 +182,7 @@ def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, 
     return 0.0 if still else length
 
 
-@inner
+@uncounted
 def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
     """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
     bound = False
@@ -190,7 +191,7 @@ def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
     return bound and left_over(jacobian, shift, weight, preferred, qdot)
 
 
-@inner
+@uncounted
 def left_over(jacobian, shift, weight, preferred, qdot):
     """Whether the task error that is left weighs more than the joint motion."""
     e, n = jacobian.shape
@@ -205,7 +206,7 @@ def left_over(jacobian, shift, weight, preferred, qdot):
     return left > motion
 
 
-@inner
+@uncounted
 def row_program(model, numbers, q, last, jacobian, motion, error, preferred, program):
     """The program of one arm: its bounds, H and g; the task shift takes the place of the motion of the reference.
 
@@ -227,14 +228,19 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
     velocity_box(numbers.limits, model.dt, q, last, lower, upper)
     if numbers.rotation_weight != 1.0:
         weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
-    jacobian *= model.dt
-    error *= numbers.gain
+    for a in range(error.shape[0]):
+        error[a] *= numbers.gain
+        for j in range(q.shape[0]):
+            jacobian[a, j] *= model.dt
     weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, numbers.limits[FASTEST])
     weight *= SCALING_WEIGHT if numbers.scaling else 1.0
     curvature(jacobian, weight, hessian)
+    share = 1.0
     if numbers.braking_share > 0.0:
-        error *= feedback_share(hessian, jacobian, error, numbers.braking_share * numbers.limits[CHANGE])
-    motion += error
+        share = feedback_share(hessian, jacobian, error, numbers.braking_share, numbers.limits[CHANGE])
+    for a in range(error.shape[0]):
+        error[a] *= share
+        motion[a] += error[a]
     if numbers.scaling:
         upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, hessian, linear)
     else:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from baselines.solvers.linear_algebra import dot
-from ikgym.kernels.jit import inlined, inner
+from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.linear_algebra import cholesky
 
 # A normal whose part off the active ones is below this share of it is a combination of them; a constraint that is
@@ -102,10 +102,17 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
         definite, and x is in the box.
     """
     n = x.shape[0]
-    basis, triangle = np.empty((n, n)), np.empty((n, n))
-    active, multipliers = np.empty(n, np.int64), np.zeros(n + 1)
-    normal, along, step, change = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    if not _start(hessian, linear, basis, x):
+    work = np.empty((2, n, n)), np.empty((4, n)), np.zeros(n + 1), np.empty(n, np.int64)
+    return _search(hessian, linear, lower, upper, rows, bounds, count, x, work)
+
+
+@uncounted
+def _search(hessian, linear, lower, upper, rows, bounds, count, x, work):
+    """See :func:`dual_minimum`; ``work`` is worked with."""
+    (matrices, vectors, multipliers, active), n = work, x.shape[0]
+    basis, triangle = matrices[0], matrices[1]
+    normal, along, step, change = vectors[0], vectors[1], vectors[2], vectors[3]
+    if not _start(hessian, linear, triangle, basis, x):
         return 0, _into_box(x, lower, upper, active, -1)
     size, steps = 0, 0
     entering = _most_missed(lower, upper, rows, bounds, count, x, active, size)
@@ -138,12 +145,14 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     return steps + 1, entering == NONE
 
 
-@inner
-def _start(hessian, linear, basis, x):
+@uncounted
+def _start(hessian, linear, factor, basis, x):
     """The minimum without constraints, and L⁻ᵀ of H = L Lᵀ as the basis; whether H is positive definite."""
     n = x.shape[0]
-    factor = hessian.copy()
-    x[:] = 0.0
+    for i in range(n):
+        x[i] = 0.0
+        for j in range(i + 1):
+            factor[i, j] = hessian[i, j]
     if not cholesky(factor):
         return False
     for j in range(n):  # column j of L⁻¹ is row j of the basis
@@ -196,13 +205,15 @@ def _missing(constraint, lower, upper, rows, bounds, x):
     return bounds[constraint - 2 * n] - dot(rows[constraint - 2 * n], x)
 
 
-@inner
+@uncounted
 def _most_missed(lower, upper, rows, bounds, count, x, active, size):
     """The constraint that x misses by most, relative to the length of its normal; NONE if all of them hold."""
     n, found, most = x.shape[0], NONE, 0.0
     for k in range(2 * n + count):
         missing, scale = _missing(k, lower, upper, rows, bounds, x), 1.0
-        if k >= 2 * n and missing > 0.0:
+        if missing <= 0.0:
+            continue
+        if k >= 2 * n:
             scale = math.sqrt(dot(rows[k - 2 * n], rows[k - 2 * n]))
         bound = lower[k] if k < n else upper[k - n] if k < 2 * n else bounds[k - 2 * n]
         if missing <= ROUNDING * max(scale, abs(bound)) or missing <= most * scale:
@@ -215,7 +226,7 @@ def _most_missed(lower, upper, rows, bounds, count, x, active, size):
     return found
 
 
-@inner
+@uncounted
 def _directions(basis, triangle, normal, size, along, step, change):
     """Where x goes with the multiplier of a constraint, and how the multipliers of active ones decrease with it.
 
@@ -273,7 +284,7 @@ def _rotate(basis, first, second, a, b):
     return c, s
 
 
-@inner
+@uncounted
 def _add(basis, triangle, along, size):
     """Makes a constraint active: its normal, Jᵀ n = ``along``, becomes one more column of R."""
     for i in range(along.shape[0] - 1, size, -1):
@@ -283,7 +294,7 @@ def _add(basis, triangle, along, size):
         triangle[i, size] = along[i]
 
 
-@inner
+@uncounted
 def _drop(basis, triangle, active, multipliers, size, leaving):
     """Drops an active constraint, and returns how many are left; the multiplier behind the last moves up with them."""
     for i in range(leaving, size):

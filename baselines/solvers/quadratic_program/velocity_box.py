@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ikgym.kernels.jit import inlined, inner
+from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
 
 # The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
@@ -35,7 +35,7 @@ def _towards(distance, dt, change, fastest):
     return min(braking_speed(room, change), fastest) if room >= 0.0 else max(room, -fastest)
 
 
-@inner
+@uncounted
 def velocity_box(limits, dt, q, last, lower, upper):
     """Least and largest joint velocities of the next step.
 

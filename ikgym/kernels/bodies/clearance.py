@@ -173,11 +173,11 @@ def gradient(prismatic, shapes, joints, first, second, vector, out):
         first: A body.
         second: Another body, or k plus the number of an obstacle.
         vector: Unit vector to the first body, and the nearest point of its core in [m]. Shape (6,).
-        out: Receives the gradient; joints that move both bodies or none have 0. Shape (n,).
+        out: Receives the gradient; joints that move both bodies or none have 0. Shape (at least n,).
     """
     links = shapes.links
     until, since = links[first], links[second] if second < links.shape[0] else 0
-    for j in range(out.shape[0]):
+    for j in range(joints.shape[0]):
         out[j] = 0.0
         if not since <= j < until:
             continue
