@@ -46,15 +46,6 @@ def test_a_pair_can_brake_before_it_reaches_the_clearance():
         assert distance >= 0.005
 
 
-def test_without_bodies_nothing_changes():
-    scenario = circle("panda")
-    assert not scenario.collides
-    one, other = (baselines.make("qp", scenario, **settings) for settings in ({}, {"influence": 0.5, "repulsion": 9.0}))
-    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
-    assert not one.among_bodies
-    assert identical(one.predict(seen)[0], other.predict(seen)[0])
-
-
 BESIDE = Box("box", [0.12, 0.21, 0.62], [0.1, 0.1, 0.1])
 
 
@@ -63,22 +54,14 @@ def test_keeps_clear_of_a_box_that_comes():
     elbow = [0.05, 0.35, 0.6]
     motion = PathTrajectory(Line(elbow, [0.05, 0.1, 0.6]), Quintic(0.2, 1.0))
     scenario = clear_scenario((Sphere("ball", [0.0, 0.0, 0.0], 0.05, motion=motion),))
-    assert scenario.obstacles_shown
-    error, clearance, stopped = played(scenario, baselines.make("qp", scenario))
+    policy, (seen, _) = baselines.make("qp", scenario), ikgym.RedundantIKEnv(scenario).reset(seed=0)
+    with pytest.raises(InvalidInputError, match="obstacles"):
+        policy.predict({key: value for key, value in seen.items() if key != "obstacles"})
+    error, clearance, stopped = played(scenario, policy)
     assert not stopped
     assert clearance > 4e-3
     assert error < 1e-4
     assert played(scenario, baselines.make("dls", scenario))[2]
-
-
-def test_needs_the_obstacles_that_move():
-    motion = PathTrajectory(Line([0.9, 0.9, 0.6], [0.9, 0.5, 0.6]), Quintic(0.2, 1.0))
-    scenario = clear_scenario((Sphere("ball", [0.0, 0.0, 0.0], 0.05, motion=motion),))
-    seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
-    policy = baselines.make("qp", scenario)
-    policy.predict(seen)
-    with pytest.raises(InvalidInputError, match="obstacles"):
-        policy.predict({key: value for key, value in seen.items() if key != "obstacles"})
 
 
 @pytest.mark.parametrize("name", ["qp", "null_space"])
@@ -93,9 +76,8 @@ def test_a_batch_is_its_rows(name):
         assert identical(policy.predict(row)[0], action)
 
 
-@pytest.mark.parametrize("name", ["panda-table", "panda-pillar"])
-def test_follows_where_there_is_a_way(name):
-    scenario = ikgym.scenarios.get(name)
+def test_follows_where_there_is_a_way():
+    scenario = ikgym.scenarios.get("panda-table")
     error, clearance, stopped = played(scenario, baselines.make("qp", scenario))
     assert not stopped
     assert error < 1e-4

@@ -19,12 +19,13 @@ def too_fast(**changes):
     return circle(speed=2.5, acceleration=100.0, **changes)
 
 
-def followed(scenario, policy, steps=None):
-    """Distances in [m] from the reference at the policy's own progress, progress, joints held back, and statuses."""
-    env = ikgym.RedundantIKEnv(scenario.replace(steps=steps or scenario.steps), preview=policy.preview)
-    seen, _ = env.reset(seed=0)
+def followed(scenario, policy, steps=None, off=0.0):
+    """Distances in [m] from the reference at the policy's own progress, progress, statuses, and joints held back."""
+    steps = steps or scenario.steps
+    env = ikgym.RedundantIKEnv(scenario.replace(steps=steps), preview=policy.preview)
+    seen, _ = env.reset(seed=0, options={"q": scenario.start_of(0) + off})
     state, out, held = None, [], 0
-    for _ in range(env.unwrapped.scenario.steps):
+    for _ in range(steps):
         action, state = policy.predict(seen, state)
         seen, *_, info = env.step(action)
         held += info["at_limit"].sum()
@@ -38,7 +39,7 @@ def followed(scenario, policy, steps=None):
 def test_is_the_minimum_that_it_states(scale):
     """Motions of the path that are nothing, tiny and usual, in units of those that the joints can make."""
     rng, between = np.random.default_rng(0), 0
-    for _ in range(200):
+    for _ in range(80):
         n, e = rng.integers(3, 9), rng.integers(2, 7)
         jacobian, motion = 1e-3 * rng.normal(size=(e, n)), scale * rng.normal(size=e)
         error, preferred = rng.choice([0.0, 1e-3]) * rng.normal(size=e), rng.normal(size=n)
@@ -60,7 +61,7 @@ def test_is_the_minimum_that_it_states(scale):
         np.testing.assert_allclose(x[:n], theirs[:n], rtol=0, atol=1e-5)
         np.testing.assert_allclose(x[n] / length, theirs[n] / length, rtol=0, atol=1e-5)
         between += lower[n] < x[n] < upper[n]
-    assert scale < STILL or between > 20
+    assert scale < STILL or between > 8
 
 
 def test_the_reference_between_samples_is_a_spline_through_them():
@@ -109,9 +110,8 @@ def test_a_path_that_can_be_driven_is_driven_on_time():
     assert {*status} == {Status.APPLIED}
 
 
-@pytest.mark.parametrize("arm", ["panda", "iiwa14"])
-def test_a_path_that_is_too_fast_becomes_slower_instead_of_wrong(arm):
-    scenario = too_fast(arm=arm)
+def test_a_path_that_is_too_fast_becomes_slower_instead_of_wrong():
+    scenario = too_fast(arm="iiwa14")
     policy = baselines.make("qp_path", scenario)
     distance, progress, _, held = followed(scenario, policy, 5 * scenario.steps)
     made = np.diff(progress, prepend=0.0)
@@ -127,12 +127,10 @@ def test_a_path_that_is_too_fast_becomes_slower_instead_of_wrong(arm):
 
 
 def test_without_a_view_ahead_it_cannot_slow_down_in_time():
-    """What the view is for: the same arm on the same path, that sees four steps ahead and thinks it ends there."""
+    """With a view of four steps it thinks that the path ends there."""
     scenario = too_fast()
-    near = baselines.make("qp_path", scenario, lookahead=0.004)
-    far = baselines.make("qp_path", scenario)
-    slow, fast = (followed(scenario, one, scenario.steps)[1][-1] for one in (near, far))
-    assert slow < 0.9 * fast
+    near, far = (baselines.make("qp_path", scenario, **given) for given in ({"lookahead": 0.004}, {}))
+    assert followed(scenario, near)[1][-1] < 0.9 * followed(scenario, far)[1][-1]
 
 
 def test_it_is_led_on_where_it_may_fall_no_further_behind():
@@ -157,19 +155,10 @@ def test_where_the_path_leaves_the_reach_it_stands_still_and_says_so():
 def test_it_begins_where_the_arm_is():
     """From beside the path the arm goes to its first pose, and follows it from there."""
     scenario = circle()
-    q = scenario.start_of(0) + 0.05
-    policy, env = baselines.make("qp_path", scenario), ikgym.RedundantIKEnv(scenario, preview=200)
-    seen, _ = env.reset(seed=0, options={"q": q})
-    state, progress, errors = None, [], []
-    for _ in range(scenario.steps):
-        action, state = policy.predict(seen, state)
-        seen, *_ = env.step(action)
-        progress.append(policy.diagnostics(state)["progress"][0])
-        there = scenario.trajectory.frames(np.array([progress[-1] * scenario.dt]), scenario.model)[0, -3:]
-        errors.append(np.linalg.norm(seen["pose"][-3:] - there))
-    arrived = np.argmax(np.array(progress) > 1.0)
+    errors, progress, *_ = followed(scenario, baselines.make("qp_path", scenario), off=0.05)
+    arrived = np.argmax(progress > 1.0)
     assert arrived > 100
-    assert max(errors[arrived + 100 :]) < 1e-6
+    assert errors[arrived + 100 :].max() < 1e-6
 
 
 def test_a_slow_joint_slows_nothing_down():

@@ -1,7 +1,6 @@
 """Saturation in the null space against its source, a linear program, and in motion."""
 
 import numpy as np
-import pytest
 from scipy.optimize import linprog
 
 import baselines
@@ -37,7 +36,7 @@ def test_the_others_make_up_for_a_joint_at_its_bound():
 
 def test_keeps_the_direction_and_never_makes_more_than_possible():
     rng, whole, scaled_down, best = np.random.default_rng(1), 0, 0, 0
-    for _ in range(150):
+    for _ in range(60):
         e, n = rng.integers(1, 7), 7
         jacobian, shift = rng.normal(size=(e, n)), rng.normal(size=e)
         shift *= rng.uniform(0.2, 3)
@@ -56,8 +55,8 @@ def test_keeps_the_direction_and_never_makes_more_than_possible():
         whole += made > 1 and not scaled
         scaled_down += scaled
         best += s > most - 1e-6
-    assert min(whole, scaled_down) > 25
-    assert best > 100  # the basic algorithm is not optimal, though mostly it is
+    assert min(whole, scaled_down) > 10
+    assert best > 40  # the basic algorithm is not optimal, though mostly it is
 
 
 def test_bounds_that_leave_out_0_are_kept():
@@ -73,11 +72,10 @@ def test_bounds_that_leave_out_0_are_kept():
     assert saturated(np.zeros((2, 3)), np.ones(2), lower, upper)[0].tolist() == [0.5, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(("arm", "dt", "bar"), [("panda", 1e-3, 1e-5), ("tiago", 4e-3, 5e-5)])
-def test_stays_on_a_path_within_all_limits(arm, dt, bar):
-    scenario = circle(arm, dt)
+def test_stays_on_a_path_within_all_limits():
+    scenario = circle("tiago", 4e-3)
     errors, _, held, statuses = played(scenario, baselines.make("sns", scenario))
-    assert errors.max() < bar
+    assert errors.max() < 5e-5
     assert held == [0, 0, 0]
     assert (statuses == Status.APPLIED).all()
 
