@@ -83,10 +83,9 @@ def near_distances(chain, shapes, checked, boxes, q, within, work, distances, re
 
 @inlined
 def _other_end(body, vector):
-    """Puts the other end of a body's core in the place of the nearest point, where that is an end.
+    """Puts the other end of a body's core in the place of the nearest point, if that is an end, and no sphere's.
 
-    Returns:
-        How much farther it is along the vector; -1 where the nearest point is no end, or the body is a sphere.
+    Returns how much farther it is along the vector; else -1.
     """
     to_start, to_end, rise = 0.0, 0.0, 0.0
     for c in range(3):
@@ -106,15 +105,8 @@ def repel(distances, reaches, gradients, count, gain, velocity):
     """Adds joint velocities that lead away from what is near, as a potential field does (Khatib 1986).
 
     Each pair asks for the joint motion that would take it out of the distance of influence d*, (d* - d) ∇d / ‖∇d‖²,
-    weighted by (1 - d / d*)²: it sets in smoothly.
-
-    Args:
-        distances: See :func:`near_distances`. Shape (ROWS,).
-        reaches: Likewise, the distances of influence d*. Shape (ROWS,).
-        gradients: Likewise. Shape (ROWS, n).
-        count: How many there are.
-        gain: In [1/s].
-        velocity: Joint velocities in [rad/s] or [m/s], added to. Shape (n,).
+    weighted by (1 - d / d*)²: it sets in smoothly. ``gain`` is in [1/s], ``velocity`` (n,) in [rad/s] or [m/s]; for the
+    others see :func:`near_distances`.
     """
     for i in range(count):
         square = LEVER * LEVER

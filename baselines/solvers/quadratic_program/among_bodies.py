@@ -79,23 +79,13 @@ def largest_approach(distance, clearance, dt, change, share):
 
 
 @inlined
-def aside(projection, gradient, motion):
-    """A gradient in the joint motions that leave the task alone, P ∇d, and how much it changes the distance by.
-
-    Args:
-        projection: P = w H⁻¹ of H = (J Δt)ᵀ J Δt + w I. Shape (n, n).
-        gradient: ∇d; many joints do not change a distance. Shape (n,).
-        motion: Receives P ∇d. Shape (n,).
-
-    Returns:
-        ∇dᵀ P ∇d, at most ‖∇d‖².
-    """
-    n = motion.shape[0]
-    for j in range(n):
+def _aside(projection, gradient, motion):
+    """A gradient in the joint motions that leave the task alone, P ∇d, (n,), and ∇dᵀ P ∇d: see :func:`keep_clear`."""
+    for j in range(motion.shape[0]):
         motion[j] = 0.0
-    for k in range(n):
-        if gradient[k] != 0.0:
-            for j in range(n):
+    for k in range(motion.shape[0]):
+        if gradient[k] != 0.0:  # many joints do not change a distance
+            for j in range(motion.shape[0]):
                 motion[j] += projection[k, j] * gradient[k]
     return dot(motion, gradient)
 
@@ -158,7 +148,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
                 change += BRAKES * abs(away[j]) * braking[j]
                 square += away[j] * away[j]
         bounds[i] = -np.inf
-        lever = aside(projection, away, motion)
+        lever = _aside(projection, away, motion)
         if lever == 0.0:
             continue
         part = lever / (ASIDE * square)

@@ -22,15 +22,7 @@ TAKEN_ON, STILL = 1e-5, 1e-9
 
 @uncounted
 def weigh_rotation(kind, weight, jacobian, motion, error):
-    """Multiplies the rows of rotation by their weight against those of position.
-
-    Args:
-        kind: The kind of task coordinates.
-        weight: In [m/rad].
-        jacobian: J. Shape (e, n).
-        motion: Motion of the reference. Shape (e,).
-        error: The present error. Shape (e,).
-    """
+    """Multiplies the rows of rotation by their weight in [m/rad]: shapes (e, n), (e,), (e,)."""
     e = error.shape[0]
     first, last = (3, e) if kind in (POSE, AXIS) else (0, e - 3)  # where there is no orientation: none
     for a in range(first, last):
@@ -115,7 +107,7 @@ def goal(jacobian, shift, weight, preferred, linear):
 
 
 @uncounted
-def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
+def goal_to_scale(jacobian, shift, weight, preferred, aim, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
     Args:
@@ -123,63 +115,44 @@ def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
         shift: Δx. Shape (e,).
         weight: See :func:`motion_weight`.
         preferred: Preferred joint velocities. Shape (n,).
+        aim: The s that is aimed at; the error that the arm rather takes on than stand still; and the largest ‖Δx‖ that
+            counts as standing still.
         hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
         linear: Receives g. Shape (n + 1,).
 
     Returns:
-        ‖Δx‖.
+        ‖Δx‖, 0 where it stands still.
     """
-    e, n = jacobian.shape
-    length = 0.0
+    (e, n), (share, taken_on, still), length = jacobian.shape, aim, 0.0
     for a in range(e):
         length += shift[a] * shift[a]
     length = math.sqrt(length)
+    moves = length > still
     for j in range(n):
         linear[j] = weight * preferred[j]
         along = 0.0
         for a in range(e):
             along += jacobian[a, j] * shift[a]
-        hessian[n, j] = hessian[j, n] = -along / length if length > 0.0 else 0.0
-    hessian[n, n] = 1.0 + SCALING_WEIGHT
-    linear[n] = SCALING_WEIGHT * length
-    return length
+        hessian[n, j] = hessian[j, n] = -along / length if moves else 0.0
+    weight_of_share = max(SCALING_WEIGHT, taken_on / length if moves else 0.0)
+    hessian[n, n] = 1.0 + weight_of_share
+    linear[n] = weight_of_share * share * length
+    return length if moves else 0.0
 
 
 @uncounted
 def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear):
     """The same where the task shift is s Δx + e, with the motion Δx along a path and a speed s that is aimed at.
 
-    Args:
-        jacobian: J Δt. Shape (e, n).
-        motion: Δx. Shape (e,).
-        error: e. Shape (e,).
-        weight: Weight of the joint motion.
-        preferred: Preferred joint velocities. Shape (n,).
-        speed: The speed that is aimed at, from 0 to 1.
-        hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
-        linear: Receives g. Shape (n + 1,).
-
-    Returns:
-        ‖Δx‖, the variable being s ‖Δx‖; 0 where the path stands still.
+    ``error`` is e, of shape (e,), and ``speed`` from 0 to 1; for the others see :func:`goal_to_scale`.
     """
+    length = goal_to_scale(jacobian, motion, weight, preferred, (speed, TAKEN_ON, STILL), hessian, linear)
     e, n = jacobian.shape
-    goal(jacobian, error, weight, preferred, linear)
-    length = 0.0
     for a in range(e):
-        length += motion[a] * motion[a]
-    length = math.sqrt(length)
-    still = length < STILL
-    for j in range(n):
-        along = 0.0
-        for a in range(e):
-            along += jacobian[a, j] * motion[a]
-        hessian[n, j] = hessian[j, n] = 0.0 if still else -along / length
-    weight_of_speed = max(SCALING_WEIGHT, 0.0 if still else TAKEN_ON / length)
-    hessian[n, n] = 1.0 + weight_of_speed
-    linear[n] = weight_of_speed * speed * length
-    for a in range(e):
-        linear[n] -= 0.0 if still else motion[a] * error[a] / length
-    return 0.0 if still else length
+        for j in range(n):
+            linear[j] += jacobian[a, j] * error[a]
+        linear[n] -= motion[a] * error[a] / length if length > 0.0 else 0.0
+    return length
 
 
 @uncounted
@@ -242,7 +215,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         error[a] *= share
         motion[a] += error[a]
     if numbers.scaling:
-        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, hessian, linear)
+        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, (1.0, 0.0, 0.0), hessian, linear)
     else:
         goal(jacobian, motion, weight, preferred, linear)
     return weight

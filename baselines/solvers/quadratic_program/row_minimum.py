@@ -43,26 +43,19 @@ def row_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     steps, found = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
     if found or count == 0:
         return steps, found
-    _lower_to_reach(lower, upper, rows, bounds, count)
+    for i in range(count):
+        most = 0.0
+        for j in range(x.shape[0]):
+            most += max(rows[i, j] * lower[j], rows[i, j] * upper[j]) if rows[i, j] != 0.0 else 0.0
+        bounds[i] = min(bounds[i], most)
     more, slack = least_slack(lower, upper, rows, bounds, count, x)
     for i in range(count):
         bounds[i] -= slack
     again = np.empty_like(x)
-    most, relaxed = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, again)
+    last, relaxed = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, again)
     if relaxed:
         x[:] = again
-    return steps + more + most, relaxed
-
-
-@inner
-def _lower_to_reach(lower, upper, rows, bounds, count):
-    """Lowers each bound of a row to the largest value of the row in the box."""
-    for i in range(count):
-        most = 0.0
-        for j in range(lower.shape[0]):
-            if rows[i, j] != 0.0:
-                most += rows[i, j] * (upper[j] if rows[i, j] > 0.0 else lower[j])
-        bounds[i] = min(bounds[i], most)
+    return steps + more + last, relaxed
 
 
 @inner
@@ -75,15 +68,9 @@ def least_slack(lower, upper, rows, bounds, count, x):
     n = x.shape[0]
     hessian, linear, solution = np.eye(n + 1), np.zeros(n + 1), np.empty(n + 1)
     low, high, sides = np.zeros(n + 1), np.full(n + 1, np.inf), np.ones((count, n + 1))
-    linear[n] = -SLACK
-    for j in range(n):
-        low[j], high[j] = lower[j], upper[j]
-        for i in range(count):
-            sides[i, j] = rows[i, j]
+    low[:n], high[:n], sides[:, :n], linear[n] = lower, upper, rows[:count], -SLACK
     steps, _ = dual_minimum(hessian, linear, low, high, sides, bounds, count, solution)
-    for j in range(n):
-        x[j] = solution[j]
-    slack = 0.0
+    x[:], slack = solution[:n], 0.0
     for i in range(count):
         slack = max(slack, bounds[i] - dot(rows[i], x))
     return steps, slack * (1.0 + 1e-7) + 1e-9
@@ -108,7 +95,7 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
 
 @uncounted
 def _search(hessian, linear, lower, upper, rows, bounds, count, x, work):
-    """See :func:`dual_minimum`; ``work`` is worked with."""
+    """See :func:`dual_minimum`, which makes the arrays that this works with."""
     (matrices, vectors, multipliers, active), n = work, x.shape[0]
     basis, triangle = matrices[0], matrices[1]
     normal, along, step, change = vectors[0], vectors[1], vectors[2], vectors[3]
@@ -228,19 +215,10 @@ def _most_missed(lower, upper, rows, bounds, count, x, active, size):
 
 @uncounted
 def _directions(basis, triangle, normal, size, along, step, change):
-    """Where x goes with the multiplier of a constraint, and how the multipliers of active ones decrease with it.
+    """Where x goes with the multiplier of a constraint: ``step``, and ``change``, by how much the others decrease.
 
-    Args:
-        basis: J, whose first columns span the active normals: Jᵀ N = R. Shape (n, n).
-        triangle: R in its upper left corner. Shape (n, n).
-        normal: That of the constraint. Shape (n,).
-        size: Number of active constraints.
-        along: Receives Jᵀ times the normal. Shape (n,).
-        step: Receives the direction of x. Shape (n,).
-        change: Receives the decrease of the multipliers. Shape (n,).
-
-    Returns:
-        Whether x can move; else the normal is a combination of the active ones.
+    The first columns of the basis J span the active normals, Jᵀ N = R, the triangle; ``along`` receives Jᵀ times the
+    normal. Returns whether x can move; else the normal is a combination of the active ones.
     """
     n, whole, rest = normal.shape[0], 0.0, 0.0
     for i in range(n):
