@@ -1,4 +1,4 @@
-"""The policies `qp` and `null_space` among bodies: against quadprog, and in motion."""
+"""The policies `qp` and `null_space` among bodies, in motion."""
 
 import numpy as np
 import pytest
