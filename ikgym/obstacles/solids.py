@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.arms.bodies import Bodies
+from ikgym.kernels.bodies import closest_rows
 from ikgym.obstacles.obstacle import Obstacle, towards
 from ikgym.validation import BoolArray, FloatArray
 
@@ -45,8 +46,6 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
         boxes: The obstacles in each configuration, or once for all. Shape (N, o, 16) or (1, o, 16).
         checked: Whether a body may not touch an obstacle. Shape (o, k).
     """
-    from ikgym.kernels.bodies.closest import closest_rows  # scenarios without bodies need none of its kernels
-
     rows, shapes = len(q), arm.bodies.shapes
     distances, pairs, points = np.empty(rows), np.empty((rows, 2), dtype=np.int64), np.empty((rows, 2, 3))
     placed = np.empty((rows, len(arm.bodies), 9))

@@ -24,15 +24,7 @@ ROUNDING = 1e-12
 
 @inner
 def saturate(jacobian, shift, damping, lower, upper, qdot):
-    """The algorithm for one arm.
-
-    Args:
-        jacobian: J. Shape (e, n).
-        shift: The task velocity. Shape (e,).
-        damping: See :class:`SaturationInNullSpace`.
-        lower: Least velocities. Shape (n,).
-        upper: Largest velocities, not below the least ones. Shape (n,).
-        qdot: Receives the joint velocities, within bounds. Shape (n,).
+    """The algorithm for one arm: J (e, n), the task velocity (e,), bounds (n,); ``qdot`` (n,) receives the velocities.
 
     Returns:
         The number of decompositions, and whether the task velocity was scaled down.

@@ -44,8 +44,7 @@ def velocity_box(limits, dt, q, last, lower, upper):
     stop (of a model whose stops are not those of the arm) it is led back, and the opposite stop gives way.
 
     Args:
-        limits: Least and largest joint coordinates, then in [rad/s] or [m/s] the largest velocities, their largest
-            changes in one step, and those that braking reckons with. Shape (5, n).
+        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
@@ -57,10 +56,7 @@ def velocity_box(limits, dt, q, last, lower, upper):
         most = _towards(limits[UPPER, j] - q[j], dt, braking, fastest)
         least = -_towards(q[j] - limits[LOWER, j], dt, braking, fastest)
         if least > most:  # beyond one of the stops
-            if q[j] > limits[UPPER, j]:
-                least = most
-            else:
-                most = least
+            least = most = most if q[j] > limits[UPPER, j] else least
         slowest, quickest = last[j] - change, last[j] + change
         upper[j] = min(max(most, slowest), quickest)
         lower[j] = min(max(least, slowest), quickest)
