@@ -115,9 +115,9 @@ def _keep(found, first, second, count, near):
 def nearest(shapes, boxes, checked, placed, core, within, near):
     """The pairs that are nearer than some distance in [m], the nearest first, and how many there are, at most c.
 
-    ``near`` receives signed distances in [m], of shape (c,), where what is farther than the c nearest is left out; pairs
-    as in :func:`smallest`, of shape (c, 2); and unit vectors to the first body with the nearest point of its core in
-    [m], of shape (c, 6). For the other arguments see :func:`smallest`.
+    ``near`` receives signed distances in [m], of shape (c,), where what is farther than the c nearest is left out;
+    pairs as in :func:`smallest`, of shape (c, 2); and unit vectors to the first body with the nearest point of its core
+    in [m], of shape (c, 6). For the other arguments see :func:`smallest`.
     """
     distances, pairs = near[0], shapes.pairs
     count, most, bodies = 0, distances.shape[0], shapes.links.shape[0]
