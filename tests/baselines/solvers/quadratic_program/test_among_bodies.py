@@ -11,7 +11,7 @@ from ikgym.obstacles import Box, Sphere
 from ikgym.trajectories import PathTrajectory
 from ikgym.trajectories.paths.line import Line
 from ikgym.trajectories.time_laws import Quintic
-from tests.baselines.solvers.quadratic_program.paths import circle
+from tests.baselines.solvers.quadratic_program.paths import circle, played
 from tests.comparison import identical
 
 
@@ -20,17 +20,11 @@ def clear_scenario(obstacles=(), **changes):
     return circle("panda-hand", radius=0.08, obstacles=obstacles, collisions=True, **changes)
 
 
-def played(scenario, policy):
-    """Largest position error in [m], the smallest clearance in [m], and whether the arm was stopped."""
-    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
-    seen, _ = env.reset(seed=0)
-    state, errors, clearances, info = None, [], [], {}
-    for _ in range(scenario.steps):
-        action, state = policy.predict(seen, state)
-        seen, *_, info = env.step(action)
-        errors.append(info["position_error"])
-        clearances.append(float(info["clearance"]))
-    return max(errors), min(clearances), bool(info["collision"])
+def follows(scenario):
+    episode = played(scenario)
+    assert not episode.stopped.any()
+    assert episode.clearance.min() > 4e-3
+    assert episode.position_error.max() < 1e-4
 
 
 def test_a_pair_can_brake_before_it_reaches_the_clearance():
@@ -57,11 +51,8 @@ def test_keeps_clear_of_a_box_that_comes():
     policy, (seen, _) = baselines.make("qp", scenario), ikgym.RedundantIKEnv(scenario).reset(seed=0)
     with pytest.raises(InvalidInputError, match="obstacles"):
         policy.predict({key: value for key, value in seen.items() if key != "obstacles"})
-    error, clearance, stopped = played(scenario, policy)
-    assert not stopped
-    assert clearance > 4e-3
-    assert error < 1e-4
-    assert played(scenario, baselines.make("dls", scenario))[2]
+    follows(scenario)
+    assert played(scenario, "dls").stopped[-1]
 
 
 @pytest.mark.parametrize("name", ["qp", "null_space"])
@@ -77,11 +68,7 @@ def test_a_batch_is_its_rows(name):
 
 
 def test_follows_where_there_is_a_way():
-    scenario = ikgym.scenarios.get("panda-table")
-    error, clearance, stopped = played(scenario, baselines.make("qp", scenario))
-    assert not stopped
-    assert error < 1e-4
-    assert clearance > 4e-3
+    follows(ikgym.scenarios.get("panda-table"))
 
 
 def test_null_space_leads_away():

@@ -5,34 +5,25 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import lsq_linear
 
-import baselines
 import ikgym
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.path_memory import moved, moves_around, remember
 from baselines.solvers.quadratic_program.path_speed import path_speed
 from baselines.solvers.quadratic_program.program import STILL, TAKEN_ON, curvature, goal_along_path
 from baselines.status import Status
-from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle
+from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
 
 
 def too_fast(**changes):
     return circle(speed=2.5, acceleration=100.0, **changes)
 
 
-def followed(scenario, policy, steps=None, off=0.0):
+def followed(scenario, **parameters):
     """Distances in [m] from the reference at the policy's own progress, progress, statuses, and joints held back."""
-    steps = steps or scenario.steps
-    env = ikgym.RedundantIKEnv(scenario.replace(steps=steps), preview=policy.preview)
-    seen, _ = env.reset(seed=0, options={"q": scenario.start_of(0) + off})
-    state, out, held = None, [], 0
-    for _ in range(steps):
-        action, state = policy.predict(seen, state)
-        seen, *_, info = env.step(action)
-        held += info["at_limit"].sum()
-        progress = policy.diagnostics(state)["progress"][0]
-        there = scenario.trajectory.frames(np.array([progress * scenario.dt]), scenario.model)[0, -3:]
-        out.append((np.linalg.norm(seen["pose"][-3:] - there), progress, policy.report(state).status[0]))
-    return *np.array(out).T, held
+    episode = played(scenario, "qp_path", **parameters)
+    progress = episode.diagnostics["progress"]
+    there = scenario.trajectory.frames(progress * scenario.dt, scenario.model)[:, -3:]
+    return np.linalg.norm(episode.pose[:, -3:] - there, axis=1), progress, episode.status, episode.at_limit.sum()
 
 
 @pytest.mark.parametrize("scale", [1e-10, 1e-7, 1e-3])
@@ -103,7 +94,7 @@ def test_the_speed_is_that_of_time_optimal_parametrisation():
 
 def test_a_path_that_can_be_driven_is_driven_on_time():
     scenario = circle()
-    distance, progress, status, held = followed(scenario, baselines.make("qp_path", scenario))
+    distance, progress, status, held = followed(scenario)
     np.testing.assert_allclose(progress, np.arange(1, scenario.steps + 1), rtol=0, atol=1e-9)
     assert distance.max() < 2e-6
     assert held == 0
@@ -112,8 +103,7 @@ def test_a_path_that_can_be_driven_is_driven_on_time():
 
 def test_a_path_that_is_too_fast_becomes_slower_instead_of_wrong():
     scenario = too_fast(arm="iiwa14")
-    policy = baselines.make("qp_path", scenario)
-    distance, progress, _, held = followed(scenario, policy, 5 * scenario.steps)
+    distance, progress, _, held = followed(scenario.replace(steps=5 * scenario.steps))
     made = np.diff(progress, prepend=0.0)
     assert made.min() >= 0.0
     assert made.max() <= 1.0 + 1e-12
@@ -122,21 +112,18 @@ def test_a_path_that_is_too_fast_becomes_slower_instead_of_wrong():
     assert distance.max() < 2e-5
     assert held == 0
     assert made[end:].min() == 1.0  # at rest, on the clock again
-    by_the_clock = baselines.track(scenario, "qp").position_error.max()
-    assert by_the_clock > 1e-2
+    assert played(scenario).position_error.max() > 1e-2  # by the clock
 
 
 def test_without_a_view_ahead_it_cannot_slow_down_in_time():
     """With a view of four steps it thinks that the path ends there."""
     scenario = too_fast()
-    near, far = (baselines.make("qp_path", scenario, **given) for given in ({"lookahead": 0.004}, {}))
-    assert followed(scenario, near)[1][-1] < 0.9 * followed(scenario, far)[1][-1]
+    assert followed(scenario, lookahead=0.004)[1][-1] < 0.9 * followed(scenario)[1][-1]
 
 
 def test_it_is_led_on_where_it_may_fall_no_further_behind():
     scenario = too_fast()
-    policy = baselines.make("qp_path", scenario, longest_lateness=0.05)
-    distance, progress, status, _ = followed(scenario, policy)
+    distance, progress, status, _ = followed(scenario, longest_lateness=0.05)
     late = np.arange(1, scenario.steps + 1) - progress
     assert late.max() == pytest.approx(50, abs=1e-9)
     assert {*status[late > 49.9]} == {Status.SATURATED}
@@ -145,7 +132,7 @@ def test_it_is_led_on_where_it_may_fall_no_further_behind():
 
 def test_where_the_path_leaves_the_reach_it_stands_still_and_says_so():
     scenario = beyond_reach()
-    distance, progress, status, _ = followed(scenario, baselines.make("qp_path", scenario))
+    distance, progress, status, _ = followed(scenario)
     assert progress[-1] < 0.9 * scenario.steps
     assert np.diff(progress)[-1] < 1e-3
     assert status[-1] == Status.SATURATED
@@ -155,7 +142,7 @@ def test_where_the_path_leaves_the_reach_it_stands_still_and_says_so():
 def test_it_begins_where_the_arm_is():
     """From beside the path the arm goes to its first pose, and follows it from there."""
     scenario = circle()
-    errors, progress, *_ = followed(scenario, baselines.make("qp_path", scenario), off=0.05)
+    errors, progress, *_ = followed(scenario.replace(start=scenario.start_of(0) + 0.05))
     arrived = np.argmax(progress > 1.0)
     assert arrived > 100
     assert errors[arrived + 100 :].max() < 1e-6
@@ -166,7 +153,7 @@ def test_a_slow_joint_slows_nothing_down():
     usual = circle("tiago", dt=4e-3)
     fastest = np.append(0.003, usual.arm.velocity_limit[1:])
     scenario = usual.replace(arm=usual.arm.replace(velocity_limit=fastest, acceleration_limit=np.full(8, 8.0)))
-    distance, progress, _, held = followed(scenario, baselines.make("qp_path", scenario))
+    distance, progress, _, held = followed(scenario)
     assert scenario.steps - progress[-1] < 2.0
     assert distance.max() < 1e-5
     assert held == 0

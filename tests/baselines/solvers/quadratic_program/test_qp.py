@@ -135,11 +135,10 @@ def test_scaling_keeps_the_direction_and_makes_the_most_of_it():
 
 
 def test_scaling_stays_on_a_path_within_all_limits():
-    scenario = circle("tiago", dt=4e-3)
-    errors, _, held, statuses = played(scenario, baselines.make("qp", scenario, task_scaling=True))
-    assert errors.max() < 5e-5
-    assert held == [0, 0, 0]
-    assert (statuses == Status.APPLIED).all()
+    episode = played(circle("tiago", dt=4e-3), task_scaling=True)
+    assert episode.position_error.max() < 5e-5
+    assert not episode.at_limit.any()
+    assert (episode.status == Status.APPLIED).all()
 
 
 @pytest.mark.parametrize(
@@ -147,39 +146,35 @@ def test_scaling_stays_on_a_path_within_all_limits():
 )
 def test_no_limit_is_met_off_the_path(scenario, scaling):
     """Beyond the reach, and above the velocity limits."""
-    errors, _, held, statuses = played(scenario, baselines.make("qp", scenario, task_scaling=scaling))
-    assert errors.max() > 0.02
-    assert held == [0, 0, 0]
-    assert set(statuses) == {Status.APPLIED, Status.SATURATED}
+    episode = played(scenario, task_scaling=scaling)
+    assert episode.position_error.max() > 0.02
+    assert not episode.at_limit.any()
+    assert {*episode.status} == {Status.APPLIED, Status.SATURATED}
 
 
 def test_no_limit_is_met_from_anywhere():
     """From random postures and from stops, towards a reference that is far away."""
-    scenario = circle(wait=0.0).replace(steps=200)
-    policy, rng, arm = baselines.make("qp", scenario), np.random.default_rng(5), scenario.arm
+    scenario, rng = circle(wait=0.0).replace(steps=200), np.random.default_rng(5)
+    arm = scenario.arm
     for k in range(0, 12, 2):
         q = rng.uniform(arm.lower, arm.upper)
         q = np.where(rng.random(7) < 0.1 * k, rng.choice([arm.lower, arm.upper]), q)
-        assert played(scenario, policy, q)[2] == [0, 0, 0]
+        assert not played(scenario.replace(start=q)).at_limit.any()
 
 
 def test_braking_comes_back_to_a_lost_reference_without_swinging():
-    scenario = circle(radius=0.15, speed=2.5, acceleration=40.0, wait=0.5)
-    scenario = scenario.replace(steps=1500)
-    braking, dead_beat = (played(scenario, baselines.make("qp", scenario, braking_share=share)) for share in (0.5, 0.0))
-    assert braking[0].max() < 0.9 * dead_beat[0].max()
-    assert braking[0][-1] < 1e-5
-    assert dead_beat[0][-1] > 1e-2
+    scenario = circle(radius=0.15, speed=2.5, acceleration=40.0, wait=0.5).replace(steps=1500)
+    braking, dead_beat = (played(scenario, braking_share=share).position_error for share in (0.5, 0.0))
+    assert braking.max() < 0.9 * dead_beat.max()
+    assert braking[-1] < 1e-5
+    assert dead_beat[-1] > 1e-2
 
 
 def test_the_null_space_leads_home():
     home = circle()
     still = ikgym.trajectories.Sinusoid(np.zeros(7), offset=home.arm.home)
     scenario = home.replace(trajectory=still, start=None, steps=100)
-    errors, qdot, *_ = played(scenario, baselines.make("qp", scenario))
-    assert np.abs(qdot).max() < 1e-6
-    errors, qdot, *_ = played(
-        scenario, baselines.make("qp", scenario, posture=tuple(home.arm.home + 0.2 * np.eye(7)[0]))
-    )
-    assert errors.max() < 1e-6
-    assert np.linalg.norm(qdot[-1]) > 0.01
+    assert np.abs(played(scenario).qdot).max() < 1e-6
+    away = played(scenario, posture=tuple(home.arm.home + 0.2 * np.eye(7)[0]))
+    assert away.position_error.max() < 1e-6
+    assert np.linalg.norm(away.qdot[-1]) > 0.01

@@ -3,7 +3,6 @@
 import numpy as np
 from scipy.optimize import linprog
 
-import baselines
 from baselines.solvers.quadratic_program.sns import saturate
 from baselines.status import Status
 from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
@@ -73,15 +72,14 @@ def test_bounds_that_leave_out_0_are_kept():
 
 
 def test_stays_on_a_path_within_all_limits():
-    scenario = circle("tiago", 4e-3)
-    errors, _, held, statuses = played(scenario, baselines.make("sns", scenario))
-    assert errors.max() < 5e-5
-    assert held == [0, 0, 0]
-    assert (statuses == Status.APPLIED).all()
+    episode = played(circle("tiago", 4e-3), "sns")
+    assert episode.position_error.max() < 5e-5
+    assert not episode.at_limit.any()
+    assert (episode.status == Status.APPLIED).all()
 
 
 def test_no_limit_is_met_off_the_path():
-    errors, _, held, statuses = played(beyond_reach(), baselines.make("sns", beyond_reach()))
-    assert errors.max() > 0.02
-    assert held == [0, 0, 0]
-    assert set(statuses) == {Status.APPLIED, Status.SATURATED}
+    episode = played(beyond_reach(), "sns")
+    assert episode.position_error.max() > 0.02
+    assert not episode.at_limit.any()
+    assert {*episode.status} == {Status.APPLIED, Status.SATURATED}
