@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
-from baselines.solvers.quadratic_program.program import held_back, left_over, row_program
+from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
@@ -65,14 +65,8 @@ def largest_approach(distance, clearance, dt, change, share):
     """The largest speed at which a pair may come nearer, in [m/s]; below 0 where it is nearer than it should be.
 
     A velocity damper (Faverjon and Tournassoud 1987): the speed is a share of the way that is left. It is also one
-    from which the pair comes to rest within that way, see :func:`braking_speed`.
-
-    Args:
-        distance: In [m].
-        clearance: The distance that is kept, in [m].
-        dt: Δt in [s].
-        change: Largest change of the speed in one step, in [m/s].
-        share: Of the way, in one step.
+    from which the pair comes to rest within that way, with so large a change of the speed in one step, in [m/s]; see
+    :func:`braking_speed`. ``share`` is that in one step of Δt in [s]; distance and clearance are in [m].
     """
     room = (distance - clearance) / dt
     return min(share * room, braking_speed(room, change)) if room >= 0.0 else RETREAT * room
@@ -92,12 +86,9 @@ def _aside(projection, gradient, motion):
 
 @inner
 def task_free(hessian, weight, projection):
-    """P = w H⁻¹, of the joint motions that leave the task alone.
+    """P = w H⁻¹, of the joint motions that leave the task alone; 0 where H is not positive definite. Shape (n, n).
 
-    Args:
-        hessian: H = (J Δt)ᵀ J Δt + w I of the program, in its upper left corner.
-        weight: w.
-        projection: Receives P; 0 where H is not positive definite. Shape (n, n).
+    H = (J Δt)ᵀ J Δt + w I is in the upper left corner of that of the program.
     """
     n = projection.shape[0]
     factor = np.empty((n, n))
@@ -210,17 +201,8 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     for j in range(q.shape[0]):
         qdot[j] = x[j]
     answer.status[row] = APPLIED if found else LIMIT
-    held = held_back(jac, shift, weight, preferred, qdot, lower, upper)
-    if _met(rows, bounds, count, x) and not held:
-        held = left_over(jac, shift, weight, preferred, qdot)
-    if found and held:
-        answer.status[row] = SATURATED
-
-
-@uncounted
-def _met(rows, bounds, count, x):
-    """Whether a row is met just so."""
     met = False
     for i in range(count):
         met = met or dot(rows[i], x) <= bounds[i] + MET
-    return met
+    if found and held_back(jac, shift, weight, preferred, qdot, lower, upper, met):
+        answer.status[row] = SATURATED

@@ -98,7 +98,7 @@ def path_step(model, numbers, seen, memory, answer):
             answer.qdot[row, j] = x[j]
         for a in range(e):
             shift[a] = missing[a] + made * motion[a]
-        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper)
+        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper, False)
         stuck = made <= max(least, STUCK) < speed
         answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
 

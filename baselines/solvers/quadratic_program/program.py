@@ -34,14 +34,9 @@ def weigh_rotation(kind, weight, jacobian, motion, error):
 
 @uncounted
 def motion_weight(jacobian, error, damping, lm_damping, fastest):
-    """Weights of the squares of the joint velocities against those of the task shift.
+    """Weight of the squares of the joint velocities against those of the task shift, see :class:`QuadraticProgram`.
 
-    Args:
-        jacobian: J Δt. Shape (e, n).
-        error: The present error. Shape (e,).
-        damping: Share of the mean squared length of the columns of J Δt.
-        lm_damping: Share of the squared error, in terms of the fastest joint.
-        fastest: Largest velocities in [rad/s] or [m/s]. Shape (n,).
+    J Δt has shape (e, n), the present error (e,), and the largest joint velocities in [rad/s] or [m/s] (n,).
     """
     e, n = jacobian.shape
     columns, square, most = 0.0, 0.0, 0.0
@@ -71,14 +66,8 @@ def curvature(jacobian, weight, hessian):
 def feedback_share(hessian, jacobian, error, part, changes):
     """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
 
-    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction.
-
-    Args:
-        hessian: H, see :func:`curvature`.
-        jacobian: J Δt. Shape (e, n).
-        error: The error to be corrected. Shape (e,).
-        part: The share of the changes that is reckoned with.
-        changes: Largest changes of the velocity in one step, in [rad/s] or [m/s]. Shape (n,).
+    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction. A ``part`` of the
+    largest ``changes`` of the velocity in one step, (n,), is reckoned with; H has shape (n, n), J Δt (e, n).
     """
     n = jacobian.shape[1]
     factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
@@ -156,27 +145,18 @@ def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, 
 
 
 @uncounted
-def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
-    """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
-    bound = False
-    for j in range(qdot.shape[0]):
+def held_back(jacobian, shift, weight, preferred, qdot, lower, upper, bound):
+    """Whether a bound is met, of a joint or as ``bound`` says, and the task error left weighs more than the motion."""
+    (e, n), left, motion = jacobian.shape, 0.0, 0.0
+    for j in range(n):
         bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
-    return bound and left_over(jacobian, shift, weight, preferred, qdot)
-
-
-@uncounted
-def left_over(jacobian, shift, weight, preferred, qdot):
-    """Whether the task error that is left weighs more than the joint motion."""
-    e, n = jacobian.shape
-    left, motion = 0.0, 0.0
+        motion += weight * (qdot[j] - preferred[j]) ** 2
     for a in range(e):
         missing = shift[a]
         for j in range(n):
             missing -= jacobian[a, j] * qdot[j]
         left += missing * missing
-    for j in range(n):
-        motion += weight * (qdot[j] - preferred[j]) ** 2
-    return left > motion
+    return bound and left > motion
 
 
 @uncounted
