@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ikgym.kernels.bodies import PLACED, Shapes, gradient, nearest, place
-from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.jit import inlined, kernel, uncounted
 
 # Most pairs that are looked at, the nearest ones, and the most rows, two for each.
 PAIRS = 12
@@ -34,8 +34,15 @@ def bodies_of(block):
     return shapes, (block[two + 2 * pairs :] != 0.0).reshape(obstacles, k)
 
 
-@inner
-def near_distances(chain, shapes, checked, boxes, q, within, distances, reaches, gradients):
+@kernel
+def near_work(n, bodies):
+    """Arrays that :func:`near_distances` works with, for n joints and so many bodies."""
+    near = np.empty(PAIRS), np.empty((PAIRS, 2), np.int64), np.empty((PAIRS, 6))
+    return np.empty((n, 6)), np.empty((bodies, PLACED)), np.empty(6), near
+
+
+@uncounted
+def near_distances(chain, shapes, checked, boxes, q, within, work, distances, reaches, gradients):
     """Signed distances of the pairs that are nearer than some distance, the nearest first, and their gradients.
 
     A body whose nearest point is an end of its core has a second row: the distance of the other end from the plane
@@ -49,28 +56,25 @@ def near_distances(chain, shapes, checked, boxes, q, within, distances, reaches,
         boxes: The obstacles. Shape (o, 16).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         within: The distance in [m].
+        work: See :func:`near_work`.
         distances: Receives signed distances in [m]. Shape (ROWS,).
         reaches: Receives the distances from which on they are looked at: ``within`` for obstacles, a share of it for
             two bodies of the arm. Shape (ROWS,).
-        gradients: Receives their gradients. Shape (ROWS, n).
+        gradients: Receives their gradients. Shape (ROWS, at least n).
 
     Returns:
         How many there are.
     """
-    joints, placed, core = np.empty((q.shape[0], 6)), np.empty((shapes.links.shape[0], PLACED)), np.empty(6)
-    near = np.empty(PAIRS), np.empty((PAIRS, 2), np.int64), np.empty((PAIRS, 6))
+    joints, placed, core, near = work
     place(chain, shapes, q, joints, placed)
     found, count = nearest(shapes, boxes, checked, placed, core, within, near), 0
     for i in range(found):
-        (first, second), vector = near[1][i], near[2][i]
-        reach = within if second >= shapes.links.shape[0] else OWN * within
-        if near[0][i] > reach:
-            continue
-        distances[count], reaches[count] = near[0][i], reach
-        gradient(chain.prismatic, shapes, joints, first, second, vector, gradients[count])
-        count += 1
-        rise = _other_end(placed[first], vector)
-        if 0.0 <= rise < reach - near[0][i]:
+        first, second, vector = near[1][i, 0], near[1][i, 1], near[2][i]
+        reach = within if second >= placed.shape[0] else OWN * within
+        for end in range(2):
+            rise = _other_end(placed[first], vector) if end else 0.0
+            if not 0.0 <= rise <= reach - near[0][i]:
+                break
             distances[count], reaches[count] = near[0][i] + rise, reach
             gradient(chain.prismatic, shapes, joints, first, second, vector, gradients[count])
             count += 1
@@ -79,10 +83,9 @@ def near_distances(chain, shapes, checked, boxes, q, within, distances, reaches,
 
 @inlined
 def _other_end(body, vector):
-    """Puts the other end of a body's core in the place of the nearest point, where that is an end.
+    """Puts the other end of a body's core in the place of the nearest point, if that is an end, and no sphere's.
 
-    Returns:
-        How much farther it is along the vector; -1 where the nearest point is no end, or the body is a sphere.
+    Returns how much farther it is along the vector; else -1.
     """
     to_start, to_end, rise = 0.0, 0.0, 0.0
     for c in range(3):
@@ -97,20 +100,13 @@ def _other_end(body, vector):
     return rise
 
 
-@inner
+@uncounted
 def repel(distances, reaches, gradients, count, gain, velocity):
     """Adds joint velocities that lead away from what is near, as a potential field does (Khatib 1986).
 
     Each pair asks for the joint motion that would take it out of the distance of influence d*, (d* - d) ∇d / ‖∇d‖²,
-    weighted by (1 - d / d*)²: it sets in smoothly.
-
-    Args:
-        distances: See :func:`near_distances`. Shape (ROWS,).
-        reaches: Likewise, the distances of influence d*. Shape (ROWS,).
-        gradients: Likewise. Shape (ROWS, n).
-        count: How many there are.
-        gain: In [1/s].
-        velocity: Joint velocities in [rad/s] or [m/s], added to. Shape (n,).
+    weighted by (1 - d / d*)²: it sets in smoothly. ``gain`` is in [1/s], ``velocity`` (n,) in [rad/s] or [m/s]; for the
+    others see :func:`near_distances`.
     """
     for i in range(count):
         square = LEVER * LEVER

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.arms.bodies import Bodies
+from ikgym.kernels.bodies import closest_rows
 from ikgym.obstacles.obstacle import Obstacle, towards
 from ikgym.validation import BoolArray, FloatArray
 
@@ -42,8 +43,6 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
     Obstacles, of shape (N or 1, o, 16), are given for each configuration, of shape (N, n), or once for all; `checked`
     says whether a body may not touch an obstacle, in shape (o, k).
     """
-    from ikgym.kernels.bodies.closest import closest_rows  # scenarios without bodies need none of its kernels
-
     rows, shapes = len(q), arm.bodies.shapes
     distances, pairs, points = np.empty(rows), np.empty((rows, 2), dtype=np.int64), np.empty((rows, 2, 3))
     placed = np.empty((rows, len(arm.bodies), 9))

@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import dot
-from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances
-from baselines.solvers.quadratic_program.program import held_back, left_over, row_program
+from baselines.solvers.linear_algebra import dot, inverse_of_factor
+from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
+from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
-from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.limits import FASTEST, LOWER, UPPER
-from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.linear_algebra import cholesky
 from ikgym.validation import FloatArray
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
@@ -65,40 +65,45 @@ def largest_approach(distance, clearance, dt, change, share):
     """The largest speed at which a pair may come nearer, in [m/s]; below 0 where it is nearer than it should be.
 
     A velocity damper (Faverjon and Tournassoud 1987): the speed is a share of the way that is left. It is also one
-    from which the pair comes to rest within that way, see :func:`braking_speed`.
-
-    Args:
-        distance: In [m].
-        clearance: The distance that is kept, in [m].
-        dt: Δt in [s].
-        change: Largest change of the speed in one step, in [m/s].
-        share: Of the way, in one step.
+    from which the pair comes to rest within that way, with so large a change of the speed in one step, in [m/s]; see
+    :func:`braking_speed`. ``share`` is that in one step of Δt in [s]; distance and clearance are in [m].
     """
     room = (distance - clearance) / dt
     return min(share * room, braking_speed(room, change)) if room >= 0.0 else RETREAT * room
 
 
-@inner
-def aside(factor, weight, gradient, motion):
-    """A gradient in the joint motions that leave the task alone, w H⁻¹ ∇d, and how much it changes the distance by.
-
-    Args:
-        factor: L of H = (J Δt)ᵀ J Δt + w I = L Lᵀ. Shape (n, n).
-        weight: w.
-        gradient: ∇d. Shape (n,).
-        motion: Receives w H⁻¹ ∇d. Shape (n,).
-
-    Returns:
-        w ∇dᵀ H⁻¹ ∇d, at most ‖∇d‖².
-    """
-    motion[:] = gradient
-    cholesky_solve(factor, motion)
-    motion *= weight
+@inlined
+def _aside(projection, gradient, motion):
+    """A gradient in the joint motions that leave the task alone, P ∇d, (n,), and ∇dᵀ P ∇d: see :func:`keep_clear`."""
+    for j in range(motion.shape[0]):
+        motion[j] = 0.0
+    for k in range(motion.shape[0]):
+        if gradient[k] != 0.0:  # many joints do not change a distance
+            for j in range(motion.shape[0]):
+                motion[j] += projection[k, j] * gradient[k]
     return dot(motion, gradient)
 
 
 @inner
-def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
+def task_free(hessian, weight, projection):
+    """P = w H⁻¹, of the joint motions that leave the task alone; 0 where H is not positive definite. Shape (n, n).
+
+    H = (J Δt)ᵀ J Δt + w I is in the upper left corner of that of the program.
+    """
+    n = projection.shape[0]
+    factor = np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            factor[i, j], projection[i, j] = hessian[i, j], 0.0
+    if cholesky(factor):
+        inverse_of_factor(factor, projection)
+    for i in range(n):
+        for j in range(n):
+            projection[i, j] *= weight
+
+
+@uncounted
+def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
     ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and
@@ -106,50 +111,50 @@ def keep_clear(numbers, model, q, hessian, weight, near, bounds, velocity):
     is slowed down as late as braking allows.
 
     Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,
-    (d* - d) P ∇d / (∇dᵀ P ∇d) with P = w H⁻¹, weighted by (1 - d / d*)². All of them together make at most a share of
-    the largest joint velocities, and less near a stop.
+    (d* - d) P ∇d / (∇dᵀ P ∇d), weighted by (1 - d / d*)². All of them together make at most a share of the largest
+    joint velocities, and less near a stop.
 
     Args:
         numbers: The :class:`AmongBodiesNumbers`.
-        model: The :class:`Model`.
+        dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
-        hessian: H of the program, in its upper left corner.
-        weight: w, the weight of the joint motion in it.
-        near: How many rows there are, and distances, distances of influence and gradients of
-            :func:`near_distances`.
-        bounds: Receives the least rates in [m/s]; -inf where no joint changes the distance. Shape (ROWS,).
+        projection: P, see :func:`task_free`. Shape (n, n).
+        count: How many rows there are.
+        near: Distances and distances of influence of :func:`near_distances`; receives the least rates in [m/s], -inf
+            where no joint changes the distance. Shapes (ROWS,). Then its gradients.
+        motion: Worked with. Shape (n,).
         velocity: Receives the joint velocities. Shape (n,).
 
     Returns:
         How much is left of other preferences: the smallest d / d*, at most 1.
     """
-    (count, distances, reaches, gradients), dt = near, model.dt
-    n, braking = velocity.shape[0], numbers.limits[BRAKING]
-    factor, motion = hessian[:n, :n].copy(), np.empty(n)
-    velocity[:], nearest = 0.0, 1.0
-    usable = count > 0 and cholesky(factor)
+    distances, reaches, bounds, gradients = near
+    n, braking, nearest = velocity.shape[0], numbers.limits[BRAKING], 1.0
+    for j in range(n):
+        velocity[j] = 0.0
     for i in range(count):
-        change, square = 0.0, 0.0
+        away, change, square = gradients[i], 0.0, 0.0
         for j in range(n):
-            if gradients[i, j] != 0.0:
-                change += BRAKES * abs(gradients[i, j]) * braking[j]
-                square += gradients[i, j] * gradients[i, j]
+            if away[j] != 0.0:
+                change += BRAKES * abs(away[j]) * braking[j]
+                square += away[j] * away[j]
         bounds[i] = -np.inf
-        if change == 0.0 or not usable:
+        lever = _aside(projection, away, motion)
+        if lever == 0.0:
             continue
-        lever = aside(factor, weight, gradients[i], motion)
         part = lever / (ASIDE * square)
         share = (1.0 + part) / (1.0 / APPROACH + part / min(GENTLE * dt, APPROACH))
         bounds[i] = -largest_approach(distances[i], numbers.clearance, dt, change, share)
         missing = reaches[i] - distances[i]
-        motion *= numbers.repulsion * min(missing / reaches[i], 1.0) ** 2 * missing / (lever + LEVER * LEVER)
-        velocity += motion
+        amount = numbers.repulsion * min(missing / reaches[i], 1.0) ** 2 * missing / (lever + LEVER * LEVER)
+        for j in range(n):
+            velocity[j] += amount * motion[j]
         nearest = min(nearest, distances[i] / reaches[i])
     _moderate(numbers.limits, q, velocity)
     return min(max(nearest, 0.0), 1.0)
 
 
-@inner
+@uncounted
 def _moderate(limits, q, velocity):
     """Shortens joint velocities to a share of the largest ones, and of the way to a stop: shapes (5, n), (n,), (n,)."""
     share = 1.0
@@ -158,51 +163,46 @@ def _moderate(limits, q, velocity):
         most = min(AWAY * limits[FASTEST, j], TO_STOP * max(room, 0.0))
         if abs(velocity[j]) > most:
             share = min(share, most / abs(velocity[j]))
-    velocity *= share
+    for j in range(q.shape[0]):
+        velocity[j] *= share
 
 
 @kernel
 def qp_step_among(model, numbers, seen, memory, answer):
     """One step of :class:`QuadraticProgram` among bodies; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
-    q, pull, (qdot, status, iterations) = seen.q, numbers.pull, answer
-    n, size = q.shape[1], q.shape[1] + numbers.scaling
-    hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
-    preferred, x, rows, bounds = np.empty(n), np.empty(size), np.zeros((ROWS, size)), np.empty(ROWS)
-    distances, reaches, away, (shapes, checked) = np.empty(ROWS), np.empty(ROWS), np.empty(n), bodies_of(numbers.bodies)
-    for row in range(q.shape[0]):
-        boxes, gradients = numbers.boxes[row % numbers.boxes.shape[0]], rows[:, :n]
-        args = shapes, checked, boxes, q[row], numbers.influence
-        count = near_distances(model.chain, *args, distances, reaches, gradients)
-        for j in range(n):
-            preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
-        jac, shift = jacobian[row], motion[row]
-        parts = hessian, linear, lower, upper
-        weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
-        near = count, distances, reaches, gradients
-        left = keep_clear(numbers, model, q[row], hessian, weight, near, bounds, away)
-        for j in range(n):
-            away[j] -= (1.0 - left) * preferred[j]
-            preferred[j] += away[j]
-            linear[j] += weight * away[j]
-        iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
-        for j in range(n):
-            qdot[row, j] = x[j]
-        status[row] = APPLIED if found else LIMIT
-        held = held_back(jac, shift, weight, preferred, qdot[row], lower, upper)
-        if _met(rows, bounds, count, x) and not held:
-            held = left_over(jac, shift, weight, preferred, qdot[row])
-        if found and held:
-            status[row] = SATURATED
+    task, (shapes, checked) = task_motion(model.chain, model.kind, seen, memory), bodies_of(numbers.bodies)
+    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.scaling
+    program = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
+    near = np.empty(ROWS), np.empty(ROWS), np.empty(ROWS), np.zeros((ROWS, size))
+    work = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(size)
+    bodies = shapes, checked, near_work(n, shapes.links.shape[0])
+    for row in range(seen.q.shape[0]):
+        _row(row, model, numbers, seen, task, bodies, program, near, work, answer)
 
 
-@inner
-def _met(rows, bounds, count, x):
-    """Whether a row is met just so."""
+@uncounted
+def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
+    """The step of one arm."""
+    (hessian, linear, lower, upper), (distances, reaches, bounds, rows), q = program, near, seen.q[row]
+    (shapes, checked, places), (projection, motion, preferred, away, x) = bodies, work
+    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.pull
+    args = shapes, checked, numbers.boxes[row % numbers.boxes.shape[0]], q, numbers.influence
+    count = near_distances(model.chain, *args, places, distances, reaches, rows)
+    for j in range(q.shape[0]):
+        preferred[j] = pull[0, j] * (pull[1, j] - q[j])
+    weight = row_program(model, numbers, q, seen.qdot[row], jac, shift, error, preferred, program)
+    task_free(hessian, weight, projection)
+    left = keep_clear(numbers, model.dt, q, projection, count, near, motion, away)
+    for j in range(q.shape[0]):
+        away[j] -= (1.0 - left) * preferred[j]
+        preferred[j] += away[j]
+        linear[j] += weight * away[j]
+    answer.iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
+    for j in range(q.shape[0]):
+        qdot[j] = x[j]
+    answer.status[row] = APPLIED if found else LIMIT
     met = False
     for i in range(count):
-        rate = 0.0
-        for j in range(x.shape[0]):
-            rate += rows[i, j] * x[j]
-        met = met or rate <= bounds[i] + MET
-    return met
+        met = met or dot(rows[i], x) <= bounds[i] + MET
+    if found and held_back(jac, shift, weight, preferred, qdot, lower, upper, met):
+        answer.status[row] = SATURATED

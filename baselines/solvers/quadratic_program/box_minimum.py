@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 # State of a variable: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
@@ -70,7 +70,7 @@ def _inwards(at, target, lower):
     return target > at if at == lower else target < at
 
 
-@kernel
+@uncounted
 def _solve(hessian, linear, x, state, factor, target):
     """The minimum over the free variables, the others where they are: ``target`` (n,), and whether there is one."""
     n = x.shape[0]
@@ -89,7 +89,7 @@ def _solve(hessian, linear, x, state, factor, target):
     return True
 
 
-@inner
+@uncounted
 def _cut(target, lower, upper, x, state):
     """Cuts the target to the box, and says whether it was within."""
     inside = True
@@ -100,7 +100,7 @@ def _cut(target, lower, upper, x, state):
     return inside
 
 
-@inner
+@uncounted
 def _advance(target, lower, upper, x, state):
     """Goes to the target, or as far as the first bound, and says whether the target was reached."""
     share, first = 1.0, NONE
@@ -121,7 +121,7 @@ def _advance(target, lower, upper, x, state):
     return False
 
 
-@inner
+@uncounted
 def _most_held_back(hessian, linear, lower, upper, x, state):
     """The variable whose release lowers the function the most, by its own slope and curvature; NONE at the optimum."""
     found, most = NONE, 0.0

@@ -89,7 +89,7 @@ def path_step(model, numbers, seen, memory, answer):
         weight = motion_weight(jac, missing, program.damping, program.lm_damping, limits[FASTEST])
         curvature(jac, SCALING_WEIGHT * weight, hessian)
         if program.braking_share > 0.0:
-            missing *= feedback_share(hessian, jac, missing, program.braking_share * limits[CHANGE])
+            missing *= feedback_share(hessian, jac, missing, program.braking_share, limits[CHANGE])
         least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
         goals = SCALING_WEIGHT * weight, preferred, speed, least
         made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)
@@ -98,25 +98,17 @@ def path_step(model, numbers, seen, memory, answer):
             answer.qdot[row, j] = x[j]
         for a in range(e):
             shift[a] = missing[a] + made * motion[a]
-        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper)
+        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper, False)
         stuck = made <= max(least, STUCK) < speed
         answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
 
 
 @inner
 def _minimum(jacobian, motion, error, goals, program, x):
-    """Joint velocities and progress.
+    """Joint velocities, then s ‖Δx‖, into x (n + 1,); the program's bounds of the joints are set, the rest is not.
 
-    Args:
-        jacobian: J Δt. Shape (e, n).
-        motion: Motion of the reference in one step. Shape (e,).
-        error: The share of the error that is taken back. Shape (e,).
-        goals: Weight of the joint motion, preferred joint velocities, the speed to aim at, and the least one.
-        program: H with the curvature of the joints, g, lower and upper bounds, those of the joints set.
-        x: Receives the joint velocities; the last element is the variable of the progress. Shape (n + 1,).
-
-    Returns:
-        The progress in steps of the reference, the number of solves, and whether the optimum was found.
+    ``goals`` are the weight of the joint motion, preferred joint velocities, the speed to aim at, and the least one.
+    Returns the progress in steps of the reference, the number of solves, and whether the optimum was found.
     """
     (weight, preferred, speed, least), (hessian, linear, lower, upper), n = goals, program, x.shape[0] - 1
     aim, made, iterations, found = speed, least, 0, False
@@ -140,22 +132,10 @@ def _readiness(error):
 
 @inner
 def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, motion, missing):
-    """Where the path is, and where it leads.
+    """Where the path is, and where it leads: the speed to aim at; above 1 where nothing is in the way.
 
-    Args:
-        model: The :class:`Model`.
-        numbers: The :class:`PathNumbers`.
-        samples: Samples of the reference. Shape (L, m).
-        progress: How far along the reference, in steps of it.
-        last: The speed of the step before.
-        pose: Measured task coordinates. Shape (m,).
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        jacobian: Receives J. Shape (e, n).
-        motion: Receives the motion of the reference at full speed, in one step. Shape (e,).
-        missing: Receives the error against the reference at this progress. Shape (e,).
-
-    Returns:
-        The speed to aim at, in steps of the reference by steps; above 1 where nothing is in the way.
+    Receive: ``jacobian`` J (e, n), ``motion`` (e,) that of the reference at full speed in one step, ``missing`` (e,)
+    the error against the reference at this progress.
     """
     first, (e, n) = int(progress), jacobian.shape
     part = progress - first

@@ -30,13 +30,7 @@ class PathMemory(NamedTuple):
 
 @inner
 def remember(samples, steps, nominal):
-    """Stores what is shown of the reference; sample 0, which is not shown, is taken to be the same as sample 1.
-
-    Args:
-        samples: Shape (L, m).
-        steps: Steps made.
-        nominal: The samples ``steps`` + 1, ``steps`` + 2, … Shape (p, m).
-    """
+    """Stores samples ``steps`` + 1, … of the reference in the ring; sample 0, which is not shown, is sample 1."""
     for a in range(samples.shape[1]):
         if steps == 0:
             samples[0, a] = nominal[0, a]

@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.quadratic_program.program import curvature, goal, motion_weight, weigh_rotation
 from ikgym.kernels import tasks
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inner, kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
@@ -90,7 +90,7 @@ def path_speed(tangents, stride, part, last, fastest, change):
     return min(math.sqrt(square), last + max(gained, 0.0))
 
 
-@inner
+@uncounted
 def _largest_square(tangent, other, steps, square, change):
     """The largest square of the speed at a place, for that at another one so many steps of the reference away.
 
@@ -105,7 +105,7 @@ def _largest_square(tangent, other, steps, square, change):
     return max(most, 0.0)
 
 
-@inner
+@uncounted
 def _ceiling(before, tangent, steps, fastest, change):
     """The largest square of the speed at a place: for the velocities there, and for the bend before it."""
     most = 1.0

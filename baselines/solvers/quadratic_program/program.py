@@ -8,7 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.kernels.tasks import AXIS, POSE
@@ -20,17 +20,9 @@ SCALING_WEIGHT = 1e-2
 TAKEN_ON, STILL = 1e-5, 1e-9
 
 
-@inner
+@uncounted
 def weigh_rotation(kind, weight, jacobian, motion, error):
-    """Multiplies the rows of rotation by their weight against those of position.
-
-    Args:
-        kind: The kind of task coordinates.
-        weight: In [m/rad].
-        jacobian: J. Shape (e, n).
-        motion: Motion of the reference. Shape (e,).
-        error: The present error. Shape (e,).
-    """
+    """Multiplies the rows of rotation by their weight in [m/rad]: shapes (e, n), (e,), (e,)."""
     e = error.shape[0]
     first, last = (3, e) if kind in (POSE, AXIS) else (0, e - 3)  # where there is no orientation: none
     for a in range(first, last):
@@ -40,16 +32,11 @@ def weigh_rotation(kind, weight, jacobian, motion, error):
             jacobian[a, j] *= weight
 
 
-@inner
+@uncounted
 def motion_weight(jacobian, error, damping, lm_damping, fastest):
-    """Weights of the squares of the joint velocities against those of the task shift.
+    """Weight of the squares of the joint velocities against those of the task shift, see :class:`QuadraticProgram`.
 
-    Args:
-        jacobian: J Δt. Shape (e, n).
-        error: The present error. Shape (e,).
-        damping: Share of the mean squared length of the columns of J Δt.
-        lm_damping: Share of the squared error, in terms of the fastest joint.
-        fastest: Largest velocities in [rad/s] or [m/s]. Shape (n,).
+    J Δt has shape (e, n), the present error (e,), and the largest joint velocities in [rad/s] or [m/s] (n,).
     """
     e, n = jacobian.shape
     columns, square, most = 0.0, 0.0, 0.0
@@ -62,7 +49,7 @@ def motion_weight(jacobian, error, damping, lm_damping, fastest):
     return damping * columns / n + lm_damping * square / (most * most)
 
 
-@kernel
+@uncounted
 def curvature(jacobian, weight, hessian):
     """H = (J Δt)ᵀ J Δt + weight · I, in the upper left corner: shapes (e, n), a number, (n, n) or more."""
     e, n = jacobian.shape
@@ -76,16 +63,11 @@ def curvature(jacobian, weight, hessian):
 
 
 @inner
-def feedback_share(hessian, jacobian, error, change):
+def feedback_share(hessian, jacobian, error, part, changes):
     """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
 
-    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction.
-
-    Args:
-        hessian: H, see :func:`curvature`.
-        jacobian: J Δt. Shape (e, n).
-        error: The error to be corrected. Shape (e,).
-        change: The changes of the velocity in one step to reckon with, in [rad/s] or [m/s]. Shape (n,).
+    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction. A ``part`` of the
+    largest ``changes`` of the velocity in one step, (n,), is reckoned with; H has shape (n, n), J Δt (e, n).
     """
     n = jacobian.shape[1]
     factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
@@ -97,13 +79,13 @@ def feedback_share(hessian, jacobian, error, change):
         return share
     cholesky_solve(factor, qdot)
     for j in range(n):
-        speed = abs(qdot[j])
-        if speed > change[j]:
-            share = min(share, braking_speed(speed, change[j]) / speed)
+        speed, change = abs(qdot[j]), part * changes[j]
+        if speed > change:
+            share = min(share, braking_speed(speed, change) / speed)
     return share
 
 
-@kernel
+@uncounted
 def goal(jacobian, shift, weight, preferred, linear):
     """The vector g = (J Δt)ᵀ Δx + weight · preferred velocities: shapes (e, n), (e,), a number, (n,), (n,)."""
     e, n = jacobian.shape
@@ -113,8 +95,8 @@ def goal(jacobian, shift, weight, preferred, linear):
             linear[j] += jacobian[a, j] * shift[a]
 
 
-@inner
-def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
+@uncounted
+def goal_to_scale(jacobian, shift, weight, preferred, aim, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
     Args:
@@ -122,90 +104,62 @@ def goal_to_scale(jacobian, shift, weight, preferred, hessian, linear):
         shift: Δx. Shape (e,).
         weight: See :func:`motion_weight`.
         preferred: Preferred joint velocities. Shape (n,).
+        aim: The s that is aimed at; the error that the arm rather takes on than stand still; and the largest ‖Δx‖ that
+            counts as standing still.
         hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
         linear: Receives g. Shape (n + 1,).
 
     Returns:
-        ‖Δx‖.
+        ‖Δx‖, 0 where it stands still.
     """
-    e, n = jacobian.shape
-    length = 0.0
+    (e, n), (share, taken_on, still), length = jacobian.shape, aim, 0.0
     for a in range(e):
         length += shift[a] * shift[a]
     length = math.sqrt(length)
+    moves = length > still
     for j in range(n):
         linear[j] = weight * preferred[j]
         along = 0.0
         for a in range(e):
             along += jacobian[a, j] * shift[a]
-        hessian[n, j] = hessian[j, n] = -along / length if length > 0.0 else 0.0
-    hessian[n, n] = 1.0 + SCALING_WEIGHT
-    linear[n] = SCALING_WEIGHT * length
-    return length
+        hessian[n, j] = hessian[j, n] = -along / length if moves else 0.0
+    weight_of_share = max(SCALING_WEIGHT, taken_on / length if moves else 0.0)
+    hessian[n, n] = 1.0 + weight_of_share
+    linear[n] = weight_of_share * share * length
+    return length if moves else 0.0
 
 
-@inner
+@uncounted
 def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear):
     """The same where the task shift is s Δx + e, with the motion Δx along a path and a speed s that is aimed at.
 
-    Args:
-        jacobian: J Δt. Shape (e, n).
-        motion: Δx. Shape (e,).
-        error: e. Shape (e,).
-        weight: Weight of the joint motion.
-        preferred: Preferred joint velocities. Shape (n,).
-        speed: The speed that is aimed at, from 0 to 1.
-        hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
-        linear: Receives g. Shape (n + 1,).
-
-    Returns:
-        ‖Δx‖, the variable being s ‖Δx‖; 0 where the path stands still.
+    ``error`` is e, of shape (e,), and ``speed`` from 0 to 1; for the others see :func:`goal_to_scale`.
     """
+    length = goal_to_scale(jacobian, motion, weight, preferred, (speed, TAKEN_ON, STILL), hessian, linear)
     e, n = jacobian.shape
-    goal(jacobian, error, weight, preferred, linear)
-    length = 0.0
     for a in range(e):
-        length += motion[a] * motion[a]
-    length = math.sqrt(length)
-    still = length < STILL
+        for j in range(n):
+            linear[j] += jacobian[a, j] * error[a]
+        linear[n] -= motion[a] * error[a] / length if length > 0.0 else 0.0
+    return length
+
+
+@uncounted
+def held_back(jacobian, shift, weight, preferred, qdot, lower, upper, bound):
+    """Whether a bound is met, of a joint or as ``bound`` says, and the task error left weighs more than the motion."""
+    (e, n), left, motion = jacobian.shape, 0.0, 0.0
     for j in range(n):
-        along = 0.0
-        for a in range(e):
-            along += jacobian[a, j] * motion[a]
-        hessian[n, j] = hessian[j, n] = 0.0 if still else -along / length
-    weight_of_speed = max(SCALING_WEIGHT, 0.0 if still else TAKEN_ON / length)
-    hessian[n, n] = 1.0 + weight_of_speed
-    linear[n] = weight_of_speed * speed * length
-    for a in range(e):
-        linear[n] -= 0.0 if still else motion[a] * error[a] / length
-    return 0.0 if still else length
-
-
-@inner
-def held_back(jacobian, shift, weight, preferred, qdot, lower, upper):
-    """Whether a joint stands at a bound, and the task error that is left weighs more than the joint motion."""
-    bound = False
-    for j in range(qdot.shape[0]):
         bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
-    return bound and left_over(jacobian, shift, weight, preferred, qdot)
-
-
-@inner
-def left_over(jacobian, shift, weight, preferred, qdot):
-    """Whether the task error that is left weighs more than the joint motion."""
-    e, n = jacobian.shape
-    left, motion = 0.0, 0.0
+        motion += weight * (qdot[j] - preferred[j]) ** 2
     for a in range(e):
         missing = shift[a]
         for j in range(n):
             missing -= jacobian[a, j] * qdot[j]
         left += missing * missing
-    for j in range(n):
-        motion += weight * (qdot[j] - preferred[j]) ** 2
-    return left > motion
+    return bound and left > motion
 
 
-@inner
+@uncounted
 def row_program(model, numbers, q, last, jacobian, motion, error, preferred, program):
     """The program of one arm: its bounds, H and g; the task shift takes the place of the motion of the reference.
 
@@ -227,16 +181,21 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
     velocity_box(numbers.limits, model.dt, q, last, lower, upper)
     if numbers.rotation_weight != 1.0:
         weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
-    jacobian *= model.dt
-    error *= numbers.gain
+    for a in range(error.shape[0]):
+        error[a] *= numbers.gain
+        for j in range(q.shape[0]):
+            jacobian[a, j] *= model.dt
     weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, numbers.limits[FASTEST])
     weight *= SCALING_WEIGHT if numbers.scaling else 1.0
     curvature(jacobian, weight, hessian)
+    share = 1.0
     if numbers.braking_share > 0.0:
-        error *= feedback_share(hessian, jacobian, error, numbers.braking_share * numbers.limits[CHANGE])
-    motion += error
+        share = feedback_share(hessian, jacobian, error, numbers.braking_share, numbers.limits[CHANGE])
+    for a in range(error.shape[0]):
+        error[a] *= share
+        motion[a] += error[a]
     if numbers.scaling:
-        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, hessian, linear)
+        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, (1.0, 0.0, 0.0), hessian, linear)
     else:
         goal(jacobian, motion, weight, preferred, linear)
     return weight

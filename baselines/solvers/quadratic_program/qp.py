@@ -40,7 +40,7 @@ def qp_step(model, numbers, seen, memory, answer):
         for j in range(n):
             qdot[row, j] = x[j]
         status[row] = APPLIED if found else LIMIT
-        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper):
+        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper, False):
             status[row] = SATURATED
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from baselines.solvers.linear_algebra import dot
-from ikgym.kernels.jit import inlined, inner
+from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.linear_algebra import cholesky
 
 # A normal whose part off the active ones is below this share of it is a combination of them; a constraint that is
@@ -43,26 +43,19 @@ def row_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     steps, found = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
     if found or count == 0:
         return steps, found
-    _lower_to_reach(lower, upper, rows, bounds, count)
+    for i in range(count):
+        most = 0.0
+        for j in range(x.shape[0]):
+            most += max(rows[i, j] * lower[j], rows[i, j] * upper[j]) if rows[i, j] != 0.0 else 0.0
+        bounds[i] = min(bounds[i], most)
     more, slack = least_slack(lower, upper, rows, bounds, count, x)
     for i in range(count):
         bounds[i] -= slack
     again = np.empty_like(x)
-    most, relaxed = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, again)
+    last, relaxed = dual_minimum(hessian, linear, lower, upper, rows, bounds, count, again)
     if relaxed:
         x[:] = again
-    return steps + more + most, relaxed
-
-
-@inner
-def _lower_to_reach(lower, upper, rows, bounds, count):
-    """Lowers each bound of a row to the largest value of the row in the box."""
-    for i in range(count):
-        most = 0.0
-        for j in range(lower.shape[0]):
-            if rows[i, j] != 0.0:
-                most += rows[i, j] * (upper[j] if rows[i, j] > 0.0 else lower[j])
-        bounds[i] = min(bounds[i], most)
+    return steps + more + last, relaxed
 
 
 @inner
@@ -75,15 +68,9 @@ def least_slack(lower, upper, rows, bounds, count, x):
     n = x.shape[0]
     hessian, linear, solution = np.eye(n + 1), np.zeros(n + 1), np.empty(n + 1)
     low, high, sides = np.zeros(n + 1), np.full(n + 1, np.inf), np.ones((count, n + 1))
-    linear[n] = -SLACK
-    for j in range(n):
-        low[j], high[j] = lower[j], upper[j]
-        for i in range(count):
-            sides[i, j] = rows[i, j]
+    low[:n], high[:n], sides[:, :n], linear[n] = lower, upper, rows[:count], -SLACK
     steps, _ = dual_minimum(hessian, linear, low, high, sides, bounds, count, solution)
-    for j in range(n):
-        x[j] = solution[j]
-    slack = 0.0
+    x[:], slack = solution[:n], 0.0
     for i in range(count):
         slack = max(slack, bounds[i] - dot(rows[i], x))
     return steps, slack * (1.0 + 1e-7) + 1e-9
@@ -102,10 +89,17 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
         definite, and x is in the box.
     """
     n = x.shape[0]
-    basis, triangle = np.empty((n, n)), np.empty((n, n))
-    active, multipliers = np.empty(n, np.int64), np.zeros(n + 1)
-    normal, along, step, change = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    if not _start(hessian, linear, basis, x):
+    work = np.empty((2, n, n)), np.empty((4, n)), np.zeros(n + 1), np.empty(n, np.int64)
+    return _search(hessian, linear, lower, upper, rows, bounds, count, x, work)
+
+
+@uncounted
+def _search(hessian, linear, lower, upper, rows, bounds, count, x, work):
+    """See :func:`dual_minimum`, which makes the arrays that this works with."""
+    (matrices, vectors, multipliers, active), n = work, x.shape[0]
+    basis, triangle = matrices[0], matrices[1]
+    normal, along, step, change = vectors[0], vectors[1], vectors[2], vectors[3]
+    if not _start(hessian, linear, triangle, basis, x):
         return 0, _into_box(x, lower, upper, active, -1)
     size, steps = 0, 0
     entering = _most_missed(lower, upper, rows, bounds, count, x, active, size)
@@ -138,12 +132,14 @@ def dual_minimum(hessian, linear, lower, upper, rows, bounds, count, x):
     return steps + 1, entering == NONE
 
 
-@inner
-def _start(hessian, linear, basis, x):
+@uncounted
+def _start(hessian, linear, factor, basis, x):
     """The minimum without constraints, and L⁻ᵀ of H = L Lᵀ as the basis; whether H is positive definite."""
     n = x.shape[0]
-    factor = hessian.copy()
-    x[:] = 0.0
+    for i in range(n):
+        x[i] = 0.0
+        for j in range(i + 1):
+            factor[i, j] = hessian[i, j]
     if not cholesky(factor):
         return False
     for j in range(n):  # column j of L⁻¹ is row j of the basis
@@ -196,13 +192,15 @@ def _missing(constraint, lower, upper, rows, bounds, x):
     return bounds[constraint - 2 * n] - dot(rows[constraint - 2 * n], x)
 
 
-@inner
+@uncounted
 def _most_missed(lower, upper, rows, bounds, count, x, active, size):
     """The constraint that x misses by most, relative to the length of its normal; NONE if all of them hold."""
     n, found, most = x.shape[0], NONE, 0.0
     for k in range(2 * n + count):
         missing, scale = _missing(k, lower, upper, rows, bounds, x), 1.0
-        if k >= 2 * n and missing > 0.0:
+        if missing <= 0.0:
+            continue
+        if k >= 2 * n:
             scale = math.sqrt(dot(rows[k - 2 * n], rows[k - 2 * n]))
         bound = lower[k] if k < n else upper[k - n] if k < 2 * n else bounds[k - 2 * n]
         if missing <= ROUNDING * max(scale, abs(bound)) or missing <= most * scale:
@@ -215,21 +213,12 @@ def _most_missed(lower, upper, rows, bounds, count, x, active, size):
     return found
 
 
-@inner
+@uncounted
 def _directions(basis, triangle, normal, size, along, step, change):
-    """Where x goes with the multiplier of a constraint, and how the multipliers of active ones decrease with it.
+    """Where x goes with the multiplier of a constraint: ``step``, and ``change``, by how much the others decrease.
 
-    Args:
-        basis: J, whose first columns span the active normals: Jᵀ N = R. Shape (n, n).
-        triangle: R in its upper left corner. Shape (n, n).
-        normal: That of the constraint. Shape (n,).
-        size: Number of active constraints.
-        along: Receives Jᵀ times the normal. Shape (n,).
-        step: Receives the direction of x. Shape (n,).
-        change: Receives the decrease of the multipliers. Shape (n,).
-
-    Returns:
-        Whether x can move; else the normal is a combination of the active ones.
+    The first columns of the basis J span the active normals, Jᵀ N = R, the triangle; ``along`` receives Jᵀ times the
+    normal. Returns whether x can move; else the normal is a combination of the active ones.
     """
     n, whole, rest = normal.shape[0], 0.0, 0.0
     for i in range(n):
@@ -273,7 +262,7 @@ def _rotate(basis, first, second, a, b):
     return c, s
 
 
-@inner
+@uncounted
 def _add(basis, triangle, along, size):
     """Makes a constraint active: its normal, Jᵀ n = ``along``, becomes one more column of R."""
     for i in range(along.shape[0] - 1, size, -1):
@@ -283,7 +272,7 @@ def _add(basis, triangle, along, size):
         triangle[i, size] = along[i]
 
 
-@inner
+@uncounted
 def _drop(basis, triangle, active, multipliers, size, leaving):
     """Drops an active constraint, and returns how many are left; the multiplier behind the last moves up with them."""
     for i in range(leaving, size):

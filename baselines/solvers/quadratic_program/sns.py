@@ -24,15 +24,7 @@ ROUNDING = 1e-12
 
 @inner
 def saturate(jacobian, shift, damping, lower, upper, qdot):
-    """The algorithm for one arm.
-
-    Args:
-        jacobian: J. Shape (e, n).
-        shift: The task velocity. Shape (e,).
-        damping: See :class:`SaturationInNullSpace`.
-        lower: Least velocities. Shape (n,).
-        upper: Largest velocities, not below the least ones. Shape (n,).
-        qdot: Receives the joint velocities, within bounds. Shape (n,).
+    """The algorithm for one arm: J (e, n), the task velocity (e,), bounds (n,); ``qdot`` (n,) receives the velocities.
 
     Returns:
         The number of decompositions, and whether the task velocity was scaled down.
@@ -45,14 +37,16 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
     size = np.sum(jacobian * jacobian)
     square, smallest = damping * size / n, ROUNDING * ROUNDING * size
     for made in range(1, n + 2):
-        rank = decompose(jacobian, free, max(square, smallest), columns, left, squares)
-        full = rank if made == 1 else full
-        if rank < full:
-            break
         for a in range(e):
             rest[a] = 0.0
             for j in range(n):
+                columns[j, a] = jacobian[a, j] if free[j] else 0.0
                 rest[a] -= jacobian[a, j] * fixed[j]
+        singular_values(columns, left, squares)
+        rank = np.sum(squares > max(square, smallest))
+        full = rank if made == 1 else full
+        if rank < full:
+            break
         inverted(columns, left, squares, square, smallest, shift, along)
         inverted(columns, left, squares, square, smallest, rest, base)
         base += fixed
@@ -66,29 +60,6 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
         free[critical] = False
         fixed[critical] = upper[critical] if along[critical] + base[critical] > upper[critical] else lower[critical]
     return made, best < 1.0
-
-
-@inner
-def decompose(jacobian, free, square, columns, left, squares):
-    """Singular values of J without the joints that are not free, squared, (J W)ᵀ = (V Σ) Uᵀ, and its rank.
-
-    Args:
-        jacobian: J. Shape (e, n).
-        free: Which joints are free. Shape (n,).
-        square: Squared singular values up to here count as 0.
-        columns: Receives V Σ. Shape (n, e).
-        left: Receives U. Shape (e, e).
-        squares: Receives Σ². Shape (e,).
-    """
-    e, n = jacobian.shape
-    for a in range(e):
-        for j in range(n):
-            columns[j, a] = jacobian[a, j] if free[j] else 0.0
-    singular_values(columns, left, squares)
-    rank = 0
-    for a in range(e):
-        rank += squares[a] > square
-    return rank
 
 
 @kernel

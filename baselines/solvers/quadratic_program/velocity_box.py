@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ikgym.kernels.jit import inlined, inner
+from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
 
 # The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
@@ -35,7 +35,7 @@ def _towards(distance, dt, change, fastest):
     return min(braking_speed(room, change), fastest) if room >= 0.0 else max(room, -fastest)
 
 
-@inner
+@uncounted
 def velocity_box(limits, dt, q, last, lower, upper):
     """Least and largest joint velocities of the next step.
 
@@ -44,8 +44,7 @@ def velocity_box(limits, dt, q, last, lower, upper):
     stop (of a model whose stops are not those of the arm) it is led back, and the opposite stop gives way.
 
     Args:
-        limits: Least and largest joint coordinates, then in [rad/s] or [m/s] the largest velocities, their largest
-            changes in one step, and those that braking reckons with. Shape (5, n).
+        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
@@ -57,10 +56,7 @@ def velocity_box(limits, dt, q, last, lower, upper):
         most = _towards(limits[UPPER, j] - q[j], dt, braking, fastest)
         least = -_towards(q[j] - limits[LOWER, j], dt, braking, fastest)
         if least > most:  # beyond one of the stops
-            if q[j] > limits[UPPER, j]:
-                least = most
-            else:
-                most = least
+            least = most = most if q[j] > limits[UPPER, j] else least
         slowest, quickest = last[j] - change, last[j] + change
         upper[j] = min(max(most, slowest), quickest)
         lower[j] = min(max(least, slowest), quickest)

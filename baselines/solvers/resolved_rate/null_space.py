@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, repel
+from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
@@ -90,9 +90,10 @@ def null_space_step_among(model, numbers, seen, memory, answer):
     aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
     objective_rows(numbers, q, aim)
     aim *= numbers.secondary_gain
+    work = near_work(q.shape[1], shapes.links.shape[0])
     for row in range(q.shape[0]):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
-        count = near_distances(model.chain, *around_it, q[row], numbers.influence, distances, reaches, gradients)
+        count = near_distances(model.chain, *around_it, q[row], numbers.influence, work, distances, reaches, gradients)
         repel(distances, reaches, gradients, count, model.dt * numbers.repulsion, aim[row])
     aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ikgym.kernels.bodies.clearance import (
     clearance_rows,
+    closest_rows,
     gradient,
     near_rows,
     nearest,
@@ -22,6 +23,7 @@ __all__ = [
     "Shapes",
     "Surroundings",
     "clearance_rows",
+    "closest_rows",
     "gradient",
     "near_rows",
     "nearest",

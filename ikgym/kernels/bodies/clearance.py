@@ -113,21 +113,11 @@ def _keep(found, first, second, count, near):
 
 @uncounted
 def nearest(shapes, boxes, checked, placed, core, within, near):
-    """The pairs that are nearer than some distance, the nearest first.
+    """The pairs that are nearer than some distance in [m], the nearest first, and how many there are, at most c.
 
-    Args:
-        shapes: The bodies, :class:`ikgym.kernels.bodies.Shapes`.
-        boxes: The obstacles, see :class:`ikgym.kernels.bodies.Surroundings`. Shape (o, 16).
-        checked: Whether a body may not touch an obstacle. Shape (o, k).
-        placed: Result of :func:`ikgym.kernels.bodies.place`. Shape (k, 9).
-        core: Worked with. Shape (6,).
-        within: The distance in [m].
-        near: Receives signed distances in [m], of shape (c,), where what is farther than the c nearest is left out;
-            pairs as in :func:`smallest`, of shape (c, 2); and unit vectors to the first body with the nearest point of
-            its core in [m], of shape (c, 6).
-
-    Returns:
-        How many there are, at most c.
+    ``near`` receives signed distances in [m], of shape (c,), where what is farther than the c nearest is left out;
+    pairs as in :func:`smallest`, of shape (c, 2); and unit vectors to the first body with the nearest point of its core
+    in [m], of shape (c, 6). For the other arguments see :func:`smallest`.
     """
     distances, pairs = near[0], shapes.pairs
     count, most, bodies = 0, distances.shape[0], shapes.links.shape[0]
@@ -173,11 +163,11 @@ def gradient(prismatic, shapes, joints, first, second, vector, out):
         first: A body.
         second: Another body, or k plus the number of an obstacle.
         vector: Unit vector to the first body, and the nearest point of its core in [m]. Shape (6,).
-        out: Receives the gradient; joints that move both bodies or none have 0. Shape (n,).
+        out: Receives the gradient; joints that move both bodies or none have 0. Shape (at least n,).
     """
     links = shapes.links
     until, since = links[first], links[second] if second < links.shape[0] else 0
-    for j in range(out.shape[0]):
+    for j in range(joints.shape[0]):
         out[j] = 0.0
         if not since <= j < until:
             continue
@@ -197,6 +187,32 @@ def clearance_rows(chain, shapes, boxes, checked, q, distances, pairs):
         place(chain, shapes, q[row], joints, placed)
         pairs[row, 0] = pairs[row, 1] = -1
         distances[row] = smallest(shapes, boxes, checked, placed, core, pairs[row])
+
+
+@kernel
+def closest_rows(chain, shapes, boxes, checked, q, distances, pairs, points, placed):
+    """Bodies and their closest pair in N configurations.
+
+    ``distances`` (N,), ``pairs`` (N, 2) and ``placed`` (N, k, 9) as above; ``points`` (N, 2, 3) are the closest ones of
+    the pair in [m]. ``boxes`` are those of each configuration, (N, o, 16), or (1, o, 16).
+    """
+    joints, core, bodies = np.empty((q.shape[1], 6)), np.empty(6), shapes.links.shape[0]
+    for row in range(q.shape[0]):
+        around = boxes[min(row, boxes.shape[0] - 1)]
+        place(chain, shapes, q[row], joints, placed[row])
+        pairs[row, 0] = pairs[row, 1] = -1
+        distances[row] = smallest(shapes, around, checked, placed[row], core, pairs[row])
+        first, second = pairs[row, 0], pairs[row, 1]
+        if first < 0:
+            points[row] = np.nan
+            continue
+        if second < bodies:
+            distance, nx, ny, nz, x, y, z = of_bodies(shapes, placed[row], first, second)
+        else:
+            distance, nx, ny, nz, x, y, z = of_obstacle(shapes, placed[row], first, around[second - bodies], core)
+        for end in range(2):
+            back = shapes.radii[first] + end * distance
+            points[row, end, 0], points[row, end, 1], points[row, end, 2] = x - back * nx, y - back * ny, z - back * nz
 
 
 @kernel

@@ -4,7 +4,9 @@ import functools
 
 import numpy as np
 
+import baselines
 import ikgym
+from baselines.episodes import rollout
 from ikgym.trajectories import PathTrajectory
 from ikgym.trajectories.orientations import FixedOrientation
 from ikgym.trajectories.paths.line import Line
@@ -36,16 +38,6 @@ def _scenario(arm, path, law, dt, wait, **changes):
     return ikgym.Scenario("path", arm, trajectory=trajectory, **given)
 
 
-def played(scenario, policy, q=None):
-    """Position errors in [m], joint velocities, joints held back in all, and statuses."""
-    env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
-    seen, _ = env.reset(seed=0, options=None if q is None else {"q": q})
-    state, errors, qdot, held, statuses = None, [], [], np.zeros(3, int), []
-    for _ in range(scenario.steps):
-        action, state = policy.predict(seen, state)
-        seen, *_, info = env.step(action)
-        errors.append(info["position_error"])
-        qdot.append(seen["qdot"])
-        held += info["at_limit"]
-        statuses.append(policy.report(state).status[0])
-    return np.array(errors), np.array(qdot), held.tolist(), np.array(statuses)
+def played(scenario, name="qp", **parameters):
+    """The record of an episode of a policy."""
+    return rollout(scenario, baselines.make(name, scenario, **parameters), 0)

@@ -39,11 +39,6 @@ def states(scenario, rows, far, seed=0):
     return Batch(q, last, pose, nominal[:, None], np.ones((rows, 1))), NominalMemory(before, np.ones(rows, np.bool_))
 
 
-def rotation_rows(task, e):
-    """The components of an error that belong to the rotation."""
-    return {"position": slice(0, 0), "pose": slice(3, 6), "axis": slice(3, 5)}.get(task, slice(0, e - 3))
-
-
 def program(policy, batch, memory, i):
     """The least squares of the docstring, for row i, without braking: matrix, goal, bounds, J Δt and Δx."""
     problem, model = policy.problem, policy.problem.model
@@ -51,9 +46,9 @@ def program(policy, batch, memory, i):
     jacobian = problem.dt * problem.task.jacobian(rotation, geometric)
     error = policy.gain * problem.task.error(memory.nominal[i], batch.pose[i])
     shift = problem.task.error(batch.nominal[i, 0], memory.nominal[i]) + error
-    rotation = rotation_rows(problem.task.name, len(error))
+    turning = {"position": slice(0, 0), "pose": slice(3, 6), "axis": slice(3, 5)}
     for rows in (jacobian, error, shift):
-        rows[rotation] *= policy.rotation_weight
+        rows[turning.get(problem.task.name, slice(0, len(error) - 3))] *= policy.rotation_weight
     rho = policy.damping * np.sum(jacobian**2) / model.joints
     rho += policy.lm_damping * (error @ error) / problem.largest_qdot.max() ** 2
     lower, upper = np.empty(model.joints), np.empty(model.joints)
@@ -70,81 +65,54 @@ SCENARIOS = {
     "tiago": circle("tiago", dt=4e-3),
     "fetch": circle("fetch", dt=4e-3),
     "axis": circle(task=ikgym.tasks.get("axis")),
+    "position": circle(task=ikgym.tasks.get("position")),
     "some limits": limited(),
     "no limits": ikgym.scenarios.get("varga7-fast"),
     "matrix": ikgym.scenarios.get("khan8-q1"),
 }
 
 
-@pytest.mark.parametrize("far", [0.3, 3.0])
+def minimum(matrix, goal, lower, upper):
+    fixed = 1e-13 * (lower == upper)  # which SciPy refuses
+    return lsq_linear(matrix, goal, (lower - fixed, upper + fixed), **BVLS).x
+
+
+@pytest.mark.parametrize(("far", "rotation_weight"), [(0.3, 1.0), (3.0, 0.2)])
 @pytest.mark.parametrize("on", SCENARIOS)
-def test_is_the_minimum_that_it_states(on, far):
-    scenario, bound = SCENARIOS[on], 0
-    policy = baselines.make(
-        "qp", scenario, damping=1e-3, lm_damping=1e-2, posture=0.3, secondary_gain=2.0, gain=0.7, braking_share=0.0
-    )
-    batch, memory = states(scenario, 40, far)
+def test_is_the_minimum_that_it_states(on, far, rotation_weight):
+    numbers = {"damping": 1e-3, "lm_damping": 1e-2, "posture": 0.3, "secondary_gain": 2.0, "gain": 0.7}
+    policy = baselines.make("qp", SCENARIOS[on], **numbers, rotation_weight=rotation_weight, braking_share=0.0)
+    (batch, memory), bound, unlimited = states(SCENARIOS[on], 25, far), 0, on in ("no limits", "matrix")
     solution = policy.solve(batch, memory)
-    for i in range(40):
+    for i, ours in enumerate(solution.qdot):
         matrix, goal, (lower, upper), *_ = program(policy, batch, memory, i)
-        fixed = lower == upper  # which SciPy refuses
-        theirs = lsq_linear(
-            matrix, goal, (lower - fixed * 1e-13, upper + fixed * 1e-13), method="bvls", tol=1e-15, max_iter=1000
-        ).x
-        ours = solution.qdot[i]
+        theirs = minimum(matrix, goal, lower, upper)
         assert ((lower <= ours) & (ours <= upper)).all()
         bound += ((ours == lower) | (ours == upper)).any()
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
-    assert on in ("no limits", "matrix") or bound > 15
+    assert (solution.iterations == 1).all() if unlimited else bound > 8
 
 
-@pytest.mark.parametrize("on", ["panda", "axis", "some limits", "matrix", "position"])
-def test_rotation_is_weighed_as_stated(on):
-    position = {"position": circle(task=ikgym.tasks.get("position"))}
-    scenario, apart = {**SCENARIOS, **position}[on], 0.0
-    policy = baselines.make("qp", scenario, rotation_weight=0.2, damping=1e-3, posture=0.3, braking_share=0.0)
-    batch, memory = states(scenario, 20, 3.0)
-    solution, equal = policy.solve(batch, memory), policy.replace(rotation_weight=1.0).solve(batch, memory)
-    for i in range(20):
-        matrix, goal, (lower, upper), *_ = program(policy, batch, memory, i)
-        fixed = 1e-13 * (lower == upper)
-        theirs = lsq_linear(matrix, goal, (lower - fixed, upper + fixed), **BVLS).x
-        np.testing.assert_allclose(solution.qdot[i], theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
-        apart = max(apart, np.abs(solution.qdot[i] - equal.qdot[i]).max())
-    assert apart == 0.0 if on == "position" else apart > 1e-3
-
-
-def test_the_less_rotation_weighs_the_nearer_is_the_position():
-    """On a path that leads out of reach, where position and rotation are at odds."""
-    scenario = beyond_reach()
-    far = [
-        played(scenario, baselines.make("qp", scenario, rotation_weight=weight))[0].max() for weight in (1.0, 0.1, 0.01)
-    ]
-    assert far[0] > 1.1 * far[1] > 1.1**2 * far[2]
-
-
-@pytest.mark.parametrize("on", ["panda", "tiago", "no limits"])
+@pytest.mark.parametrize("on", ["tiago", "no limits"])
 def test_scaling_is_the_minimum_that_it_states(on):
     scenario = SCENARIOS[on]
     policy = baselines.make("qp", scenario, task_scaling=True, damping=1e-2, posture=0.3, braking_share=0.0)
-    batch, memory = states(scenario, 40, 4.0, seed=2)
+    batch, memory = states(scenario, 25, 4.0, seed=2)
     solution = policy.solve(batch, memory)
-    for i in range(40):
+    for i in range(25):
         matrix, goal, (lower, upper), jacobian, shift = program(policy, batch, memory, i)
         weight, e = 1e-2, len(shift)
         length = np.linalg.norm(shift, keepdims=True)
         rows = [np.hstack([jacobian, -shift[:, None] / length]), weight**0.5 * np.eye(1, len(lower) + 1, len(lower))]
         stacked = np.vstack([*rows, np.hstack([weight**0.5 * matrix[e:], np.zeros((len(lower), 1))])])
         wanted = [np.zeros(e), weight**0.5 * length, weight**0.5 * goal[e:]]
-        lower, upper = np.append(lower - (lower == upper) * 1e-13, 0.0), np.append(upper, length)
-        theirs = lsq_linear(stacked, np.concatenate(wanted), (lower, upper), **BVLS).x[:-1]
+        theirs = minimum(stacked, np.concatenate(wanted), np.append(lower, 0.0), np.append(upper, length))[:-1]
         np.testing.assert_allclose(solution.qdot[i], theirs, rtol=0, atol=1e-5 * np.abs(theirs).max())
 
 
-@pytest.mark.parametrize("on", ["panda", "tiago"])
-def test_scaling_keeps_the_direction_and_makes_the_most_of_it(on):
+def test_scaling_keeps_the_direction_and_makes_the_most_of_it():
     """Against a linear program: the largest s for which the bounds allow s Δx."""
-    scenario, scaled = SCENARIOS[on], 0
+    scenario, scaled = SCENARIOS["panda"], 0
     policy = baselines.make("qp", scenario, task_scaling=True, secondary_gain=0.0, braking_share=0.0)
     batch, memory = states(scenario, 100, 4.0, seed=2)
     batch.qdot[:] *= 0.03  # so that any direction can be made within a step
@@ -166,77 +134,47 @@ def test_scaling_keeps_the_direction_and_makes_the_most_of_it(on):
     assert scaled > 5
 
 
-def test_without_limits_it_is_damped_least_squares():
-    scenario = ikgym.scenarios.get("varga7-pose-random")
-    policy = baselines.make("qp", scenario)
-    batch, memory = states(scenario, 20, 0.1)
-    solution = policy.solve(batch, memory)
-    assert (solution.iterations == 1).all()
-    for i in range(20):
-        matrix, goal, *_ = program(policy, batch, memory, i)
-        wanted = np.linalg.lstsq(matrix, goal * (np.arange(len(goal)) < 6), rcond=None)[0]  # no posture
-        np.testing.assert_allclose(solution.qdot[i], wanted, rtol=1e-7, atol=1e-9)
+def test_scaling_stays_on_a_path_within_all_limits():
+    episode = played(circle("tiago", dt=4e-3), task_scaling=True)
+    assert episode.position_error.max() < 5e-5
+    assert not episode.at_limit.any()
+    assert (episode.status == Status.APPLIED).all()
 
 
-@pytest.mark.parametrize(("arm", "dt", "bar"), [("panda", 1e-3, 1e-5), ("tiago", 4e-3, 5e-5), ("gen3", 1e-3, 1e-5)])
-@pytest.mark.parametrize("scaling", [False, True])
-def test_stays_on_a_path_within_all_limits(arm, dt, bar, scaling):
-    scenario = circle(arm, dt)
-    errors, _, held, statuses = played(scenario, baselines.make("qp", scenario, task_scaling=scaling))
-    assert errors.max() < bar
-    assert held == [0, 0, 0]
-    assert (statuses == Status.APPLIED).all()
-
-
-@pytest.mark.parametrize("scaling", [False, True])
-@pytest.mark.parametrize("scenario", [beyond_reach(), circle(radius=0.15, speed=2.5, acceleration=40.0)])
+@pytest.mark.parametrize(
+    ("scenario", "scaling"), [(beyond_reach(), False), (circle(radius=0.15, speed=2.5, acceleration=40.0), True)]
+)
 def test_no_limit_is_met_off_the_path(scenario, scaling):
     """Beyond the reach, and above the velocity limits."""
-    errors, _, held, statuses = played(scenario, baselines.make("qp", scenario, task_scaling=scaling))
-    assert errors.max() > 0.02
-    assert held == [0, 0, 0]
-    assert set(statuses) == {Status.APPLIED, Status.SATURATED}
+    episode = played(scenario, task_scaling=scaling)
+    assert episode.position_error.max() > 0.02
+    assert not episode.at_limit.any()
+    assert {*episode.status} == {Status.APPLIED, Status.SATURATED}
 
 
 def test_no_limit_is_met_from_anywhere():
     """From random postures and from stops, towards a reference that is far away."""
-    scenario = circle(wait=0.0).replace(steps=200)
-    policy, rng, arm = baselines.make("qp", scenario), np.random.default_rng(5), scenario.arm
+    scenario, rng = circle(wait=0.0).replace(steps=200), np.random.default_rng(5)
+    arm = scenario.arm
     for k in range(0, 12, 2):
         q = rng.uniform(arm.lower, arm.upper)
         q = np.where(rng.random(7) < 0.1 * k, rng.choice([arm.lower, arm.upper]), q)
-        assert played(scenario, policy, q)[2] == [0, 0, 0]
+        assert not played(scenario.replace(start=q)).at_limit.any()
 
 
 def test_braking_comes_back_to_a_lost_reference_without_swinging():
-    scenario = circle(radius=0.15, speed=2.5, acceleration=40.0, wait=0.5)
-    scenario = scenario.replace(steps=1500)
-    braking, dead_beat = (played(scenario, baselines.make("qp", scenario, braking_share=share)) for share in (0.5, 0.0))
-    assert braking[0].max() < 0.9 * dead_beat[0].max()
-    assert braking[0][-1] < 1e-5
-    assert dead_beat[0][-1] > 1e-2
+    scenario = circle(radius=0.15, speed=2.5, acceleration=40.0, wait=0.5).replace(steps=1500)
+    braking, dead_beat = (played(scenario, braking_share=share).position_error for share in (0.5, 0.0))
+    assert braking.max() < 0.9 * dead_beat.max()
+    assert braking[-1] < 1e-5
+    assert dead_beat[-1] > 1e-2
 
 
-def rests_at(scenario, **parameters):
-    """Where the joints go while the tool stands."""
-    n = scenario.joints
-    still = scenario.replace(trajectory=ikgym.trajectories.Sinusoid(np.zeros(n), offset=scenario.arm.home), start=None)
-    policy = baselines.make("qp", still, **parameters)
-    env = ikgym.RedundantIKEnv(still)
-    seen, _ = env.reset()
-    start, state = seen["q"], None
-    for _ in range(200):
-        action, state = policy.predict(seen, state)
-        seen, *_, info = env.step(action)
-        assert info["position_error"] < 1e-6
-    return start, seen["q"]
-
-
-def test_the_null_space_leads_to_a_posture():
-    scenario = circle().replace(steps=200)
-    start, end = rests_at(scenario)  # at home
-    np.testing.assert_allclose(end, start, rtol=0, atol=1e-7)
-    goal = start + np.array([0.2, 0, 0, 0, 0, 0, 0])
-    assert np.linalg.norm(rests_at(scenario, posture=tuple(goal))[1] - goal) < 0.995 * np.linalg.norm(start - goal)
-    _, still = rests_at(scenario, posture=tuple(goal), secondary_gain=0.0)
-    np.testing.assert_allclose(still, start, rtol=0, atol=1e-7)
+def test_the_null_space_leads_home():
+    home = circle()
+    still = ikgym.trajectories.Sinusoid(np.zeros(7), offset=home.arm.home)
+    scenario = home.replace(trajectory=still, start=None, steps=100)
+    assert np.abs(played(scenario).qdot).max() < 1e-6
+    away = played(scenario, posture=tuple(home.arm.home + 0.2 * np.eye(7)[0]))
+    assert away.position_error.max() < 1e-6
+    assert np.linalg.norm(away.qdot[-1]) > 0.01

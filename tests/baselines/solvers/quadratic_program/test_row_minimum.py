@@ -1,10 +1,10 @@
-"""The minimum in a box under rows against quadprog, the optimality conditions, and a linear programme."""
+"""The minimum in a box under rows against quadprog, and against a linear programme where there is none."""
 
 import numpy as np
 import pytest
+import quadprog
 from scipy.optimize import linprog
 
-from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 
 KINDS = ["plain", "stiff", "parallel rows", "fixed", "degenerate", "no rows"]
@@ -35,8 +35,8 @@ def solved(hessian, linear, lower, upper, rows, bounds):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_agrees_with_quadprog(kind):
-    quadprog, rng, active = pytest.importorskip("quadprog"), np.random.default_rng(KINDS.index(kind)), 0
-    for _ in range(500):
+    rng, active, refused = np.random.default_rng(KINDS.index(kind)), 0, 0
+    for _ in range(300):
         hessian, linear, lower, upper, rows, bounds = random_problem(rng, kind)
         x, _, found, kept = solved(hessian, linear, lower, upper, rows, bounds)
         assert found
@@ -47,43 +47,18 @@ def test_agrees_with_quadprog(kind):
         try:
             theirs = quadprog.solve_qp(hessian, linear, normals, np.concatenate([lower, -upper, bounds]))[0]
         except ValueError:  # it takes some degenerate programmes for infeasible
+            refused += 1
             continue
         cost, least = (0.5 * y @ hessian @ y - linear @ y for y in (x, theirs))
         assert cost - least < 1e-8 * (abs(cost) + abs(least))
         active += (rows @ x - bounds < 1e-9).any()
-    assert kind == "no rows" or active > 100
-
-
-@pytest.mark.parametrize("kind", ["plain", "stiff", "fixed"])
-def test_meets_the_optimality_conditions(kind):
-    """The slope is a combination of the active normals with multipliers that are not negative."""
-    rng = np.random.default_rng(10 + KINDS.index(kind))
-    for _ in range(300):
-        hessian, linear, lower, upper, rows, bounds = random_problem(rng, kind)
-        x, *_ = solved(hessian, linear, lower, upper, rows, bounds)
-        slope = hessian @ x - linear
-        normals = np.vstack([np.eye(len(x))[x == lower], -np.eye(len(x))[x == upper], rows[rows @ x - bounds < 1e-9]])
-        size = np.abs(hessian) @ np.abs(x) + np.abs(linear)
-        count = len(normals)
-        # least ‖slope - normalsᵀ u‖ in the largest component, u >= 0
-        sides = np.vstack([np.hstack([normals.T, -size[:, None]]), np.hstack([-normals.T, -size[:, None]])])
-        found = linprog(np.eye(count + 1)[-1], sides, np.concatenate([slope, -slope]), bounds=[(0, None)] * (count + 1))
-        assert found.fun < 1e-6
-
-
-def test_is_the_minimum_in_the_box_where_no_row_binds():
-    rng = np.random.default_rng(3)
-    for _ in range(200):
-        hessian, linear, lower, upper, rows, _ = random_problem(rng, "plain")
-        theirs = np.empty(len(linear))
-        box_minimum(hessian, linear, lower, upper, theirs)
-        x, *_ = solved(hessian, linear, lower, upper, rows, rows @ theirs - 1.0)
-        np.testing.assert_allclose(x, theirs, rtol=0, atol=1e-9)
+    assert kind == "no rows" or active > 60
+    assert refused < 60
 
 
 def test_lowers_rows_that_contradict_each_other_by_the_least_amount():
     rng, contradictions = np.random.default_rng(4), 0
-    for _ in range(500):
+    for _ in range(100):
         hessian, linear, lower, upper, rows, bounds = random_problem(rng, "plain")
         bounds += rng.exponential(size=len(bounds))
         reach = np.maximum(rows * lower, rows * upper).sum(axis=1)
@@ -99,7 +74,7 @@ def test_lowers_rows_that_contradict_each_other_by_the_least_amount():
             contradictions += 1
         else:
             assert least < 1e-9
-    assert contradictions > 200
+    assert contradictions > 40
 
 
 def test_a_matrix_that_is_not_positive_definite_leads_nowhere():

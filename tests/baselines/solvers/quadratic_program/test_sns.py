@@ -1,10 +1,8 @@
 """Saturation in the null space against its source, a linear program, and in motion."""
 
 import numpy as np
-import pytest
 from scipy.optimize import linprog
 
-import baselines
 from baselines.solvers.quadratic_program.sns import saturate
 from baselines.status import Status
 from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
@@ -37,7 +35,7 @@ def test_the_others_make_up_for_a_joint_at_its_bound():
 
 def test_keeps_the_direction_and_never_makes_more_than_possible():
     rng, whole, scaled_down, best = np.random.default_rng(1), 0, 0, 0
-    for _ in range(150):
+    for _ in range(60):
         e, n = rng.integers(1, 7), 7
         jacobian, shift = rng.normal(size=(e, n)), rng.normal(size=e)
         shift *= rng.uniform(0.2, 3)
@@ -56,8 +54,8 @@ def test_keeps_the_direction_and_never_makes_more_than_possible():
         whole += made > 1 and not scaled
         scaled_down += scaled
         best += s > most - 1e-6
-    assert min(whole, scaled_down) > 25
-    assert best > 100  # the basic algorithm is not optimal, though mostly it is
+    assert min(whole, scaled_down) > 10
+    assert best > 40  # the basic algorithm is not optimal, though mostly it is
 
 
 def test_bounds_that_leave_out_0_are_kept():
@@ -73,17 +71,15 @@ def test_bounds_that_leave_out_0_are_kept():
     assert saturated(np.zeros((2, 3)), np.ones(2), lower, upper)[0].tolist() == [0.5, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(("arm", "dt", "bar"), [("panda", 1e-3, 1e-5), ("tiago", 4e-3, 5e-5)])
-def test_stays_on_a_path_within_all_limits(arm, dt, bar):
-    scenario = circle(arm, dt)
-    errors, _, held, statuses = played(scenario, baselines.make("sns", scenario))
-    assert errors.max() < bar
-    assert held == [0, 0, 0]
-    assert (statuses == Status.APPLIED).all()
+def test_stays_on_a_path_within_all_limits():
+    episode = played(circle("tiago", 4e-3), "sns")
+    assert episode.position_error.max() < 5e-5
+    assert not episode.at_limit.any()
+    assert (episode.status == Status.APPLIED).all()
 
 
 def test_no_limit_is_met_off_the_path():
-    errors, _, held, statuses = played(beyond_reach(), baselines.make("sns", beyond_reach()))
-    assert errors.max() > 0.02
-    assert held == [0, 0, 0]
-    assert set(statuses) == {Status.APPLIED, Status.SATURATED}
+    episode = played(beyond_reach(), "sns")
+    assert episode.position_error.max() > 0.02
+    assert not episode.at_limit.any()
+    assert {*episode.status} == {Status.APPLIED, Status.SATURATED}

@@ -7,14 +7,8 @@ import ikgym
 from baselines.policy import Problem
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
-from ikgym.kernels.jit import kernel
 
 DT, CHANGE = 0.1, 0.2
-
-
-@kernel
-def speed_of(room, change):
-    return braking_speed(room, change)
 
 
 def way(speed, change):
@@ -26,18 +20,16 @@ def test_braking_speed_is_the_largest_that_can_brake():
     rng = np.random.default_rng(0)
     rooms = [0.0, CHANGE, 3 * CHANGE, 6 * CHANGE, *rng.uniform(0, 50, 200), *10 ** rng.uniform(-9, 3, 50)]
     for room in rooms:
-        speed = speed_of(room, CHANGE)
+        speed = braking_speed(room, CHANGE)
         assert way(speed, CHANGE) == pytest.approx(room, rel=1e-10, abs=1e-15)
-    assert speed_of(3.0, np.inf) == 3.0
-    assert speed_of(np.inf, CHANGE) == np.inf == speed_of(np.inf, np.inf)
+    assert braking_speed(3.0, np.inf) == 3.0
+    assert braking_speed(np.inf, CHANGE) == np.inf == braking_speed(np.inf, np.inf)
 
 
 def box(q, last, lower=-1.0, upper=1.0, fastest=2.0, change=CHANGE):
-    low, high = np.empty(1), np.empty(1)
-    velocity_box(
-        np.array([[lower], [upper], [fastest], [change], [change]]), DT, np.array([q]), np.array([last]), low, high
-    )
-    return low[0], high[0]
+    limits, bounds = np.array([[lower], [upper], [fastest], [change], [change]]), np.empty((2, 1))
+    velocity_box(limits, DT, np.array([q]), np.array([last]), bounds[0], bounds[1])
+    return tuple(bounds[:, 0])
 
 
 @pytest.mark.parametrize(
@@ -65,13 +57,13 @@ def test_bounds(given, wanted):
     assert box(**given) == pytest.approx(wanted, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["panda", "tiago", "fetch", "gen3"])
+@pytest.mark.parametrize("name", ["panda", "tiago", "gen3"])
 def test_no_choice_of_velocities_within_bounds_meets_a_limit(name):
     """From starts at and near the stops, at either end of the bounds or between, whatever float32 makes of it."""
     arm = ikgym.arms.get(name)
     rng = np.random.default_rng(1)
     trajectory = ikgym.trajectories.Sinusoid(np.zeros(arm.joints), offset=arm.home)
-    scenario = ikgym.Scenario("any", arm, ikgym.tasks.get("pose"), trajectory, dt=0.004, steps=1500)
+    scenario = ikgym.Scenario("any", arm, ikgym.tasks.get("pose"), trajectory, dt=0.004, steps=600)
     env, rows = ikgym.RedundantIKEnv(scenario), limits_with_braking(Problem.of(scenario))
     lower, upper = np.empty(arm.joints), np.empty(arm.joints)
     near = np.where(np.isfinite(arm.lower), arm.lower, -1.0), np.where(np.isfinite(arm.upper), arm.upper, 1.0)
@@ -81,7 +73,7 @@ def test_no_choice_of_velocities_within_bounds_meets_a_limit(name):
         for k in range(scenario.steps):
             velocity_box(rows, scenario.dt, seen["q"], seen["qdot"], lower, upper)
             assert (lower <= upper).all()
-            if k % 150 == 0:
+            if k % 100 == 0:
                 direction = rng.choice([0.0, 1.0, rng.random()], arm.joints)
             qdot = lower + direction * (upper - lower)
             seen, *_, info = env.step((qdot / scenario.velocity_limit).astype(np.float32))
