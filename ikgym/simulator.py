@@ -128,15 +128,13 @@ class Simulator:
         Args:
             active: The rows to reset. Shape (N,).
             generators: One a row; each draws its row's trajectory and plant.
-            starts: Result of :meth:`checked_starts`; the scenario's own starts if left out. Shape (N, n).
-            arm_seeds: Result of :meth:`checked_arm_seeds`; arms are drawn with their episodes if left out.
+            starts: Of :meth:`checked`; the scenario's own starts if left out. Shape (N, n).
+            arm_seeds: Of :meth:`checked`; arms are drawn with their episodes if left out.
             noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
-            steps: Result of :meth:`checked_steps`: episodes are entered after so many steps. Shape (N,).
+            steps: Of :meth:`checked`: episodes are entered after so many steps. Shape (N,).
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        if len(rows) == 0:
-            return
         own = [generators[row] for row in rows.tolist()]
         episodes = scenario.trajectory.samples(own)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
@@ -161,17 +159,18 @@ class Simulator:
                 self._plant.settle(entered, state.qdot[entered], steps[later])
             state.step[entered] = steps[later]
 
-    def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
-        """Starts chosen by the user, see :func:`ikgym.scenarios.entering.checked_starts`."""
-        return checked_starts(q, self.rows, self.scenario)
+    def checked(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of :meth:`reset` from the options of an environment's reset.
 
-    def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
-        """Seeds of arms chosen by the user, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
-        return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
-
-    def checked_steps(self, given: Any) -> npt.NDArray[np.int64] | None:
-        """Steps after which a user enters episodes, see :func:`ikgym.scenarios.entering.checked_steps`."""
-        return checked_steps(given, self.rows, self.scenario)
+        Raises:
+            InvalidInputError: A value is refused.
+        """
+        rows, scenario = self.rows, self.scenario
+        return {
+            "starts": checked_starts(options.get("q"), rows, scenario),
+            "arm_seeds": checked_arm_seeds(options.get("arm_seed"), rows, scenario.plant, scenario.name),
+            "steps": checked_steps(options.get("step"), rows, scenario),
+        }
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """The outcome before a step.

@@ -164,13 +164,11 @@ class RedundantIKVectorEnv(
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not (self._begun | mask).all():
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
-        starts = self._simulator.checked_starts(options.get("q"))
-        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
-        steps = self._simulator.checked_steps(options.get("step"))
+        chosen = self._simulator.checked(options)
         for row, one in enumerate(seeds):
             if (one is not None or row not in self._generators) and mask[row]:
                 self._generators[row], self._seeds[row] = seeding.np_random(one)
-        self._begin(mask, starts, arm_seeds, steps)
+        self._begin(mask, **chosen)
         out = self._simulator.observe()
         self._record(out, begun=mask, rows=mask)
         return observation(out), contexts(self.context, mask)
@@ -266,14 +264,8 @@ class RedundantIKVectorEnv(
     def _rows(self) -> list[ArmRow]:
         return [ArmRow(self, index) for index in range(self.num_envs)]
 
-    def _begin(
-        self,
-        mask: BoolArray,
-        starts: FloatArray | None = None,
-        arm_seeds: Sequence[int | None] | None = None,
-        steps: npt.NDArray[np.int64] | None = None,
-    ) -> None:
-        self._simulator.reset(mask, self._generators, starts, arm_seeds, steps=steps)
+    def _begin(self, mask: BoolArray, **chosen: Any) -> None:
+        self._simulator.reset(mask, self._generators, **chosen)
         self._begun |= mask
         self._ended = self._ended & ~mask
 
