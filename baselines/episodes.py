@@ -60,8 +60,8 @@ def play(
     simulator.reset(
         np.ones(rows, dtype=np.bool_),
         [seeding.np_random(one.seed)[0] for one in drawn],
-        arm_seeds=simulator.checked_arm_seeds([one.arm_seed for one in drawn]),
         noise_seeds=[one.noise_seed for one in drawn],
+        **simulator.checked({"arm_seed": [one.arm_seed for one in drawn]}),
     )
     out = simulator.observe()
     for _ in range(scenario.steps):

@@ -208,14 +208,12 @@ class RedundantIKEnv(gym.Env[Any, Any]):
                 limits; the seed of the arm is none, or the plant draws no arm; there is no such step or joint path.
         """
         options = checked_options(options, OPTIONS)
-        starts = self._simulator.checked_starts(options.get("q"))
-        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
-        steps = self._simulator.checked_steps(options.get("step"))
+        chosen = self._simulator.checked(options)
         super().reset(seed=seed)
-        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], starts, arm_seeds, steps=steps)
+        self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], **chosen)
         self._ended = True  # until it is certain that the arm touches nothing
         out = self._simulator.observe()
-        self._step, self._ended = 0 if steps is None else int(steps[0]), False
+        self._step, self._ended = int(self._simulator.steps_made[0]), False
         if self._pictures is not None:
             self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
         return observation(out, 0), {"context": self.context} if self.context.size else {}

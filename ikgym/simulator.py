@@ -22,7 +22,7 @@ from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
-from ikgym.scenarios.entering import checked_starts, checked_steps, first_states
+from ikgym.scenarios.entering import checked_starts, checked_steps, entered_states
 from ikgym.scenarios.frames.motion import MotionFrames, frames_of_rows
 from ikgym.scenarios.frames.nominal import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
@@ -128,50 +128,49 @@ class Simulator:
         Args:
             active: The rows to reset. Shape (N,).
             generators: One a row; each draws its row's trajectory and plant.
-            starts: Result of :meth:`checked_starts`; the scenario's own starts if left out. Shape (N, n).
-            arm_seeds: Result of :meth:`checked_arm_seeds`; arms are drawn with their episodes if left out.
+            starts: Of :meth:`checked`; the scenario's own starts if left out. Shape (N, n).
+            arm_seeds: Of :meth:`checked`; arms are drawn with their episodes if left out.
             noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
-            steps: Result of :meth:`checked_steps`: episodes are entered after so many steps. Shape (N,).
+            steps: Of :meth:`checked`: episodes are entered after so many steps. Shape (N,).
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
-        if len(rows) == 0:
-            return
         own = [generators[row] for row in rows.tolist()]
         episodes = scenario.trajectory.samples(own)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
+        q = scenario.first_q_of(episodes) if starts is None else starts[rows]
         if self._plant is not None:
-            self._plant.begin(rows, generators, arm_seeds, noise_seeds)
+            jogged = scenario.jogged if scenario.jogs and starts is None else None
+            self._plant.begin(rows, own, arm_seeds, noise_seeds, q, jogged)
             if scenario.draws_obstacles and self._plant.contacts is not None:
                 draw_obstacles(scenario, self._plant.contacts, rows, episodes, own)
-        if starts is None:
-            chains = None if self._plant is None else self._plant.chains(rows[steps == 0])
-            state.q[rows], state.qdot[rows] = first_states(scenario, self._nominal.point, episodes, steps, chains)
-        else:
-            state.q[rows], state.qdot[rows] = starts[rows], 0.0
+        state.q[rows], state.qdot[rows], state.step[rows] = q, 0.0, 0
         self._own_start[rows], self._ready = starts is None, 0
-        state.step[rows] = 0
         if scenario.random:
             self._nominal.begin(state.frames, rows, episodes, steps)
-        if self._plant is not None and steps.any():
-            # Sensors and drives remember an arm that has always been as it is now: its first measurement, everywhere.
-            entered, active = rows[steps > 0], np.zeros(self.rows, dtype=np.bool_)
-            active[entered] = True
-            self._run(active, self._new(self._count), moving=False)
-            self._plant.settle(entered, state.qdot[entered], steps[steps > 0])
-        state.step[rows] = steps
+        if steps.any():
+            later = steps > 0
+            entered = rows[later]
+            if starts is None:
+                state.q[entered], state.qdot[entered] = entered_states(scenario, self._nominal.point, episodes, steps)
+            if self._plant is not None:
+                # Sensors and drives remember an arm that has always been as it is now: its first measurement.
+                self._run(np.isin(np.arange(self.rows), entered), self._new(self._count), moving=False)
+                self._plant.settle(entered, state.qdot[entered], steps[later])
+            state.step[entered] = steps[later]
 
-    def checked_starts(self, q: npt.ArrayLike | None) -> FloatArray | None:
-        """Starts chosen by the user, see :func:`ikgym.scenarios.entering.checked_starts`."""
-        return checked_starts(q, self.rows, self.scenario)
+    def checked(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of :meth:`reset` from the options of an environment's reset.
 
-    def checked_arm_seeds(self, given: Any) -> list[int | None] | None:
-        """Seeds of arms chosen by the user, see :func:`ikgym.plant.rows.checked_arm_seeds`."""
-        return checked_arm_seeds(given, self.rows, self.scenario.plant, self.scenario.name)
-
-    def checked_steps(self, given: Any) -> npt.NDArray[np.int64] | None:
-        """Steps after which a user enters episodes, see :func:`ikgym.scenarios.entering.checked_steps`."""
-        return checked_steps(given, self.rows, self.scenario)
+        Raises:
+            InvalidInputError: A value is refused.
+        """
+        rows, scenario = self.rows, self.scenario
+        return {
+            "starts": checked_starts(options.get("q"), rows, scenario),
+            "arm_seeds": checked_arm_seeds(options.get("arm_seed"), rows, scenario.plant, scenario.name),
+            "steps": checked_steps(options.get("step"), rows, scenario),
+        }
 
     def observe(self, active: npt.NDArray[np.bool_] | None = None, out: Outcome | None = None) -> Outcome:
         """The outcome before a step.

@@ -96,8 +96,8 @@ class RedundantIKVectorEnv(
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.lost_distance = checked_distance(lost_distance)
-        self._generators: list[np.random.Generator | None] = [None] * self.num_envs
-        self._seeds: list[int | None] = [None] * self.num_envs
+        self._generators: dict[int, np.random.Generator] = {}
+        self._seeds: dict[int, int] = {}
         self.render_mode = render_mode
         self._pictures: list[Pictures] = []
         if render_mode is not None:
@@ -164,13 +164,11 @@ class RedundantIKVectorEnv(
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not (self._begun | mask).all():
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
-        starts = self._simulator.checked_starts(options.get("q"))
-        arm_seeds = self._simulator.checked_arm_seeds(options.get("arm_seed"))
-        steps = self._simulator.checked_steps(options.get("step"))
+        chosen = self._simulator.checked(options)
         for row, one in enumerate(seeds):
-            if one is not None and mask[row]:
+            if (one is not None or row not in self._generators) and mask[row]:
                 self._generators[row], self._seeds[row] = seeding.np_random(one)
-        self._begin(mask, starts, arm_seeds, steps)
+        self._begin(mask, **chosen)
         out = self._simulator.observe()
         self._record(out, begun=mask, rows=mask)
         return observation(out), contexts(self.context, mask)
@@ -258,25 +256,16 @@ class RedundantIKVectorEnv(
 
     def generator(self, row: int) -> tuple[np.random.Generator, int]:
         """A row's generator and its seed, made from fresh entropy where there was none."""
-        generator, seed = self._generators[row], self._seeds[row]
-        if generator is None or seed is None:
-            generator, seed = seeding.np_random()
-            self._generators[row], self._seeds[row] = generator, seed
-        return generator, seed
+        if row not in self._generators:
+            self._generators[row], self._seeds[row] = seeding.np_random()
+        return self._generators[row], self._seeds[row]
 
     @functools.cached_property
     def _rows(self) -> list[ArmRow]:
         return [ArmRow(self, index) for index in range(self.num_envs)]
 
-    def _begin(
-        self,
-        mask: BoolArray,
-        starts: FloatArray | None = None,
-        arm_seeds: Sequence[int | None] | None = None,
-        steps: npt.NDArray[np.int64] | None = None,
-    ) -> None:
-        generators = {row: self.generator(row)[0] for row in np.flatnonzero(mask).tolist()}
-        self._simulator.reset(mask, generators, starts, arm_seeds, steps=steps)
+    def _begin(self, mask: BoolArray, **chosen: Any) -> None:
+        self._simulator.reset(mask, self._generators, **chosen)
         self._begun |= mask
         self._ended = self._ended & ~mask
 

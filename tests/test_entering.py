@@ -34,8 +34,8 @@ def test_blocks_of_reference_poses_begin_where_an_episode_is_entered():
     seen = []
     for memory in (2**26, 8 * 12 * 2 * 40):
         simulator = Simulator(scenario, 2, (1, 5), memory)
-        steps = simulator.checked_steps([700, 3])
-        simulator.reset(np.ones(2, dtype=bool), list(map(np.random.default_rng, range(2))), steps=steps)
+        given = simulator.checked({"step": [700, 3]})
+        simulator.reset(np.ones(2, dtype=bool), list(map(np.random.default_rng, range(2))), **given)
         for _ in range(60):
             out = simulator.step(np.zeros((2, 7)))
         seen.append(out.numbers)

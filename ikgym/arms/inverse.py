@@ -17,7 +17,7 @@ from ikgym import parallel
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
-from ikgym.kernels.kinematics import Chain, stacked
+from ikgym.kernels.kinematics import Chain, forward_rows, stacked
 from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
 
 # 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.
@@ -72,13 +72,14 @@ def alike(arm: Any, chains: Chain, q: FloatArray, *, oriented: bool) -> FloatArr
     (k, n) as the postures within the limits, are without the last bits in which processors differ.
     """
     ranges, length, _ = _search(arm)
-    rotations, positions = arm.forward(q)
+    q, rotations, positions = np.array(q), np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+    forward_rows(arm.chain, q, rotations, positions)
     if not oriented:
         rotations = np.empty((len(q), 0, 0))
     out, converged = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
     settings = NEARBY._replace(length=length)
-    inverse_rows(*map(_locked, chains), *ranges, *settings, rotations, positions, np.array(q), out, converged)
-    return np.clip(np.round(out, DECIMALS), arm.lower, arm.upper)
+    inverse_rows(*map(_locked, chains), *ranges, *settings, rotations, positions, q, out, converged)
+    return out.round(DECIMALS).clip(arm.lower, arm.upper)
 
 
 def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
+from numpy.random import PCG64
 
 from ikgym.arms import Arm
 from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
@@ -133,8 +134,9 @@ def episode_key(plant: Plant, generator: np.random.Generator) -> int:
     """The key from which an episode's plant is drawn; an ideal plant does not touch the generator."""
     if plant.ideal:
         return 0
-    if isinstance(generator.bit_generator, np.random.PCG64):  # Gymnasium's: the same bits in a tenth of the time
-        return int(generator.bit_generator.random_raw()) >> 1
+    bits = generator.bit_generator
+    if isinstance(bits, PCG64):  # Gymnasium's: the same bits in a tenth of the time
+        return bits.random_raw() >> 1
     return int(generator.integers(2**63, dtype=np.uint64))
 
 

@@ -213,7 +213,7 @@ class Plant(Frozen):
         """Whether the moving arm differs from the data sheet, payload aside."""
         return self._on("zero", "link", "axis") or bool(self.arms)
 
-    @property
+    @functools.cached_property
     def draws_arm(self) -> bool:
         """Whether episodes draw the arm or its drives, which `arm_seed` can keep."""
         return self._on("zero", "link", "axis") or len(self.arms) > 1 or bool(self.context)

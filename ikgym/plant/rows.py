@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,11 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
-from ikgym.plant.arm_kernels import stream_rows
+from ikgym.parallel import in_chunks
+from ikgym.plant.arm_kernels import Numbers, stream_rows
 from ikgym.plant.checks import PerJoint
 from ikgym.plant.contact import Contacts
-from ikgym.plant.draw import Draws, arm_key, episode_key
+from ikgym.plant.draw import Draws, Keys, arm_key, episode_key
 from ikgym.plant.plant import Plant
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
@@ -22,8 +23,9 @@ from ikgym.validation import FloatArray, one_a_row
 
 # Numbers of the streams that other noises of an episode come from: more than there are effects.
 NOISE_SEEDS = 1000
-
-Generators = Sequence[np.random.Generator] | Mapping[int, np.random.Generator]
+# Rows whose draws are worth a thread.
+GRAIN = 32
+Integers = npt.NDArray[np.int64]
 
 
 def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[int | None] | None:
@@ -96,11 +98,11 @@ class PlantRows:
         self.context = np.zeros((rows, len(plant.context)))
         self.state = PlantState(
             keys=np.zeros((rows, STREAMS), dtype=np.uint64),
-            lag=np.ones(rows),
+            lag=np.zeros(rows),
             delay=np.zeros(rows, dtype=np.int64),
             pose_noise=np.zeros(rows),
             pose_rotation_noise=np.zeros(rows),
-            pose_every=np.ones(rows, dtype=np.int64),
+            pose_every=np.zeros(rows, dtype=np.int64),
             drive=np.zeros((rows, n)),
             play=np.zeros((rows, n)),
             commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
@@ -109,6 +111,9 @@ class PlantRows:
             shown=np.zeros((rows, coordinates)),
             shown_step=np.zeros(rows, dtype=np.int64),
         )
+        keys = np.zeros(rows, dtype=np.uint64)
+        self._set(np.arange(rows), *self._draws.numbers(keys))
+        self._draw(np.arange(rows), keys)
 
     @staticmethod
     def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
@@ -118,46 +123,64 @@ class PlantRows:
 
     def begin(
         self,
-        rows: npt.NDArray[np.int64],
-        generators: Generators,
+        rows: Integers,
+        generators: Sequence[np.random.Generator],
         arm_seeds: Sequence[int | None] | None,
-        noise_seeds: Sequence[int] | None = None,
+        noise_seeds: Sequence[int] | None,
+        q: FloatArray,
+        jogged: Callable[[FloatArray, Chain], FloatArray] | None,
     ) -> None:
         """Draws the plants of new episodes.
 
         Args:
             rows: The rows that begin one. Shape (k,).
-            generators: One a row.
-            arm_seeds: One a row: the seed of the arm that it keeps, None for an arm that is drawn with the episode.
-            noise_seeds: One a row, for the noise of drives and sensors; 0 is the noise of the episode.
+            generators: Of these rows.
+            arm_seeds: One for each of the N rows: that of the arm that it keeps, None for one drawn with the episode.
+            noise_seeds: Likewise, for the noise of drives and sensors; 0 is the noise of the episode.
+            q: Starts of the arm of the data sheet in [rad] or [m], changed in place to those of the arms that move.
+                Shape (k, n).
+            jogged: See :meth:`ikgym.Scenario.jogged`; None where all arms start at the same joint coordinates.
         """
-        keys = [episode_key(self._plant, generators[row]) for row in rows.tolist()]
-        arm_keys = keys
+        keys = arm_keys = [episode_key(self._plant, generator) for generator in generators]
         if arm_seeds is not None:
             kept = [arm_seeds[row] for row in rows.tolist()]
             arm_keys = [key if seed is None else arm_key(seed) for key, seed in zip(keys, kept, strict=True)]
-        of_arms = np.array(arm_keys, dtype=np.uint64)
-        numbers, self.context[rows] = self._draws.numbers(of_arms)
-        self._draws.arms(of_arms, rows, numbers, self.arms)
+        if noise_seeds is not None:
+            keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
+        stream_rows(np.array(keys, dtype=np.uint64), rows, self.state.keys)
+        self.state.drive[rows] = self.state.play[rows] = 0.0
         if self.contacts is not None:
             self.contacts.stopped[rows] = False
-            self._draws.bodies(of_arms, rows, numbers, self.arms.axes, (self.contacts.starts, self.contacts.ends))
+        of_arms = np.array(arm_keys, dtype=np.uint64)
+
+        def work(first: int, last: int) -> None:
+            part = slice(first, last)
+            if self._plant.draws_arm:
+                self._draw(rows[part], of_arms[part])
+            if jogged is not None:
+                offsets, axes, tool, tool_rotation = (array[rows[part], 0] for array in self.arms)
+                q[part] = jogged(q[part], Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation))
+
+        in_chunks(work, len(rows), GRAIN)
+
+    def _draw(self, rows: Integers, keys: Keys) -> None:
+        """Draws the arms of some rows, their drives and sensors, by their keys. Shapes (k,)."""
+        numbers, context = self._draws.numbers(keys)
+        self._draws.arms(keys, rows, numbers, self.arms)
+        if self.contacts is not None:
+            self._draws.bodies(keys, rows, numbers, self.arms.axes, (self.contacts.starts, self.contacts.ends))
+        if context.size:
+            self._set(rows, numbers, context)
+
+    def _set(self, rows: Integers, numbers: Numbers, context: FloatArray) -> None:
+        """Sets what rows have drawn from ranges."""
+        self.context[rows] = context
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
         self.state.delay[rows] = numbers.command_delay
         for name in ("pose_noise", "pose_rotation_noise", "pose_every"):
             getattr(self.state, name)[rows] = getattr(numbers, name)
-        if noise_seeds is not None:
-            keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
-        stream_rows(np.array(keys, dtype=np.uint64), rows, self.state.keys)
-        for changed in (self.state.drive, self.state.play):
-            changed[rows] = 0.0
 
-    def chains(self, rows: npt.NDArray[np.int64]) -> Chain:
-        """The arms of some rows without their payload, with a leading axis of k."""
-        offsets, axes, tool, tool_rotation = (part[rows, 0] for part in self.arms)
-        return Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation)
-
-    def settle(self, rows: npt.NDArray[np.int64], qdot: FloatArray, steps: npt.NDArray[np.int64]) -> None:
+    def settle(self, rows: Integers, qdot: FloatArray, steps: Integers) -> None:
         """Fills the histories of rows with their first measurement and a velocity, as after a long time of both.
 
         Args:

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.kinematics import Chain
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory, joint_paths_of
 from ikgym.validation import FloatArray, float_array, one_a_row, shortened
@@ -51,31 +50,23 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
     return np.array(checked, dtype=np.int64)
 
 
-def first_states(
-    scenario: Scenario, points: Steps, episodes: Sequence[Trajectory], steps: Steps, chains: Chain | None
+def entered_states(
+    scenario: Scenario, points: Steps, episodes: Sequence[Trajectory], steps: Steps
 ) -> tuple[FloatArray, FloatArray]:
-    """The arms' first states in episodes: at rest at the start, or on the reference joint path after some steps.
+    """States of the episodes that are entered, on their reference joint paths.
 
     Args:
         scenario: The scenario.
         points: Its points, of `Scenario.points`.
-        episodes: Trajectories of the k episodes.
-        steps: Steps after which they are entered, or 0. Shape (k,).
-        chains: The arms that move, of the episodes that are not entered; None where the plant is ideal.
+        episodes: Trajectories of all episodes.
+        steps: Steps after which k of them are entered, and 0 of the others.
 
     Returns:
         Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
         applied. Shapes (k, n).
     """
-    entered, shape = steps > 0, (len(steps), scenario.joints)
-    q, qdot = np.empty(shape) if entered.all() else scenario.first_q_of(episodes), np.zeros(shape)
-    if chains is not None and scenario.jogs and not entered.all():
-        q[~entered] = scenario.jogged(q[~entered], chains)
-    if entered.any():
-        times = points[np.array([steps - 1, steps])].T.astype(np.float64) * scenario.dt
-        paths = joint_paths_of(episodes, times)[entered]
-        q[entered] = paths[:, 1]
-        scenario.arm.check_posture(f"Reference joint path of scenario {scenario.name!r}", paths[:, 1])
-        limit = scenario.largest_qdot
-        qdot[entered] = np.clip((paths[:, 1] - paths[:, 0]) / scenario.dt, -limit, limit)
-    return q, qdot
+    times = points[np.array([steps - 1, steps])].T.astype(np.float64) * scenario.dt
+    before, now = joint_paths_of(episodes, times)[steps > 0].swapaxes(0, 1)
+    scenario.arm.check_posture(f"Reference joint path of scenario {scenario.name!r}", now)
+    limit = scenario.largest_qdot
+    return now, np.clip((now - before) / scenario.dt, -limit, limit)
