@@ -11,15 +11,17 @@ import numpy.typing as npt
 
 from baselines.paths.starts import solutions
 from ikgym.exceptions import InvalidInputError
-from ikgym.obstacles.solids import closest, solids_of
+from ikgym.kernels.bodies import clearance_rows
+from ikgym.obstacles.solids import solids_of
 from ikgym.scenarios import Scenario
 from ikgym.validation import BoolArray, FloatArray, float_array, per_joint
 
 #: Joint motions aside from the task, as shares of the largest ones that are allowed, and how many random directions
 #: they have in null spaces of several dimensions.
-ASIDE, DIRECTIONS = np.linspace(-0.9, 0.9, 5), 3
-#: To first order a motion may be so many times the largest one: waypoints can be 10° apart.
-FIRST_ORDER = 1.3
+ASIDE, DIRECTIONS = np.linspace(-0.98, 0.98, 5), 3
+#: To first order a motion may be so many times the largest one: waypoints can be 10° apart. If it is still too large
+#: when the pose is met, it is corrected along the null space so many times.
+FIRST_ORDER, CORRECTIONS = 1.3, 2
 #: Share of the largest motion that is used, and distance in [m] and angle in [rad] within which a pose is met.
 USED, TOLERANCE = 0.999, 1e-9
 #: Between two knots bodies are checked at these parts of the way.
@@ -108,16 +110,33 @@ class Routes:
 
     def _next(self, knot: int, last: Layer, rng: np.random.Generator) -> Layer:
         """The postures at a knot that can be reached from those before."""
-        arm = self.scenario.arm
         moves, rows = self._moves(knot, last.q, rng)
-        start = np.clip(last.q[rows] + self.largest * moves, arm.lower, arm.upper)
-        q, met = arm.inverse(*self._pose(knot), start=start, tolerance=TOLERANCE, restarts=0)
-        moved = (q - last.q[rows]) / self.largest
-        near = met & (np.abs(moved).max(axis=1) <= USED)
-        found = Layer(q, last.cost[rows] + (moved * moved).sum(axis=1), rows).of(near)
+        q, met = self._exact(knot, last.q[rows] + self.largest * moves)
+        for _ in range(CORRECTIONS):
+            moves = (q - last.q[rows]) / self.largest
+            size = np.abs(moves).max(axis=1)
+            far = np.flatnonzero(met & (size > USED) & (size <= FIRST_ORDER))
+            q[far], met[far] = self._exact(knot, q[far] + self.largest * self._back(q[far], moves[far]))
+        moves = (q - last.q[rows]) / self.largest
+        near = met & (np.abs(moves).max(axis=1) <= USED)
+        found = Layer(q, last.cost[rows] + (moves * moves).sum(axis=1), rows).of(near)
         for part in PARTS:
             found = found.of(self._clear(knot - 1.0 + part, self._between(last, found, part)))
         return found.of(self._cheapest(found.q, found.cost, rng))
+
+    def _exact(self, knot: int, start: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Postures at the pose of a knot, near others, and whether there are any."""
+        arm = self.scenario.arm
+        start = np.clip(start, arm.lower, arm.upper)
+        return arm.inverse(*self._pose(knot), start=start, tolerance=TOLERANCE, restarts=0)
+
+    def _back(self, q: FloatArray, moves: FloatArray) -> FloatArray:
+        """Joint motions in the null space at q after which moves that are too large are within 1, to first order."""
+        jacobian = self.scenario.arm.jacobian(q)[:, : self.scenario.task.error_size] * self.largest
+        direction = np.linalg.svd(jacobian).Vh[:, -1]
+        middle, half = _room(moves, direction)
+        half = ASIDE[-1] * np.maximum(half, 0.0)
+        return np.clip(0.0, middle - half, middle + half)[:, None] * direction
 
     def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""
@@ -139,8 +158,9 @@ class Routes:
         moves, begins = [], []
         for _ in range(1 if free.shape[2] == 1 else DIRECTIONS):
             direction = (free @ rng.normal(size=(len(rows), free.shape[2], 1)))[..., 0]
+            middle, half = _room(least, direction)
             for share in ASIDE:
-                moves.append(least + _aside(least, direction, share)[:, None] * direction)
+                moves.append(least + (middle + share * half)[:, None] * direction)
                 begins.append(rows)
         every = np.concatenate(moves)
         small = np.abs(every).max(axis=1) <= FIRST_ORDER
@@ -175,15 +195,23 @@ class Routes:
         scenario = self.scenario
         if not scenario.collides:
             return np.ones(len(q), dtype=np.bool_)
-        time = np.interp([knot], np.arange(len(self.times)), self.times)
-        boxes = solids_of(scenario.obstacles, time, scenario.model)
-        return closest(scenario.arm, q, boxes, scenario.surroundings.checked).distances > self.margin
+        boxes = self._boxes[min(round(len(PARTS) * knot), len(self._boxes) - 1)]
+        distances, pairs = np.empty(len(q)), np.empty((len(q), 2), dtype=np.int64)
+        arm, checked = scenario.arm, scenario.surroundings.checked
+        clearance_rows(arm.chain, arm.bodies.shapes, boxes, checked, q, distances, pairs)
+        return distances > self.margin
+
+    @functools.cached_property
+    def _boxes(self) -> FloatArray:
+        """The obstacles at all parts of the way; once where they are at rest. Shape (p, o, 16)."""
+        knots = np.arange(len(PARTS) * (len(self.times) - 1) + 1) / len(PARTS)
+        times = np.interp(knots, np.arange(len(self.times)), self.times)
+        return solids_of(self.scenario.obstacles, times, self.scenario.model)
 
 
-def _aside(least: FloatArray, direction: FloatArray, share: float) -> FloatArray:
-    """How far to go along directions, of shape (N, n): a share of the largest that keeps all joints within 1. (N,)."""
+def _room(moves: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far moves can go along directions with all joints within 1: middle and half of the range. Shape (N,) each."""
     with np.errstate(divide="ignore"):
-        ends = np.sort([(-1.0 - least) / direction, (1.0 - least) / direction], axis=0)
+        ends = np.sort([(-1.0 - moves) / direction, (1.0 - moves) / direction], axis=0)
     low, high = ends[0].max(axis=1), ends[1].min(axis=1)
-    out: FloatArray = 0.5 * (low + high + share * (high - low))
-    return out
+    return 0.5 * (low + high), 0.5 * (high - low)
