@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 from stable_baselines3.common.env_util import make_vec_env
 
@@ -169,6 +170,40 @@ def test_pickled_in_mid_episode_it_goes_on_as_before(name):
     for action in actions[1:]:
         assert same_bits(env.step(action)[:4], again.step(action)[:4])
     assert same_bits(env.reset()[0], again.reset()[0])
+
+
+@every_id
+def test_wrappers_of_gymnasium(name):
+    env = NormalizeObservation(RecordEpisodeStatistics(TimeLimit(gym.make(name, lost_distance=None), 4)))
+    env.reset(seed=0)
+    steps = [env.step(action) for action in actions_of(env, 4)]
+    seen, _, terminated, truncated, info = steps[-1]
+    assert truncated
+    assert not terminated
+    assert info["episode"]["r"] == pytest.approx(sum(step[1] for step in steps))
+    assert seen.shape == env.unwrapped.observation_space.shape
+    assert np.abs(seen).max() < 10.0
+
+
+@one_id_at_least
+def test_an_episode_is_recorded(name, tmp_path):
+    pytest.importorskip("moviepy")
+    env = TimeLimit(gym.make(name, render_mode="rgb_array"), 4)
+    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
+    env.reset(seed=0)
+    for action in actions_of(env, 4):
+        env.step(action)
+    env.close()
+    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
+
+
+@every_id
+def test_torchrl_takes_it(name):
+    check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
+    from torchrl.envs import GymEnv, GymWrapper
+
+    check_env_specs(GymEnv(name))
+    check_env_specs(GymWrapper(gym.make_vec(name, 2, autoreset_mode="SameStep")))
 
 
 @one_id_at_least
