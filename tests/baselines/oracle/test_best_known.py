@@ -1,5 +1,6 @@
 import concurrent.futures
 import dataclasses
+import itertools
 import json
 import math
 
@@ -47,13 +48,12 @@ def file(tmp_path, monkeypatch):
 def test_the_data_of_the_package_are_in_order():
     there = read()
     assert [(r.scenario, r.seed) for r in there] == sorted({(r.scenario, r.seed) for r in there})
-    for known in there:
-        scenario = ikgym.scenarios.get(known.scenario)
-        one = test_sets.SETS.get(known.scenario)
-        arm_seed = None if one is None else one.arm_seed(known.seed)
-        assert lookup(scenario, known.seed, arm_seed) == known, "the episode has changed since: find its cost anew"
-        assert known.cost >= 0.0
-        assert known.found_by
+    assert all(known.cost >= 0.0 and known.found_by for known in there)
+    for name, some in itertools.groupby(there, lambda known: known.scenario):
+        one, (first, *_, last) = test_sets.SETS.get(name), [*some] * 2
+        for known in (first, last):  # a scenario that has changed has other hashes for all seeds
+            found = lookup(ikgym.scenarios.get(name), known.seed, one and one.arm_seed(known.seed))
+            assert found == known, "the episode has changed since: find its cost anew"
     lines = ",\n".join(json.dumps(dataclasses.asdict(r), ensure_ascii=False) for r in there)
     assert best_known.DATA.read_text(encoding="utf-8") == f"[\n{lines}\n]\n"
 
