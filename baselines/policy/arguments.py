@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.problem import Batch, Memory, Problem, Solution
+from baselines.policy.problem import Batch, Memory, Problem
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED, OBSTACLE, SOMETIMES
 from ikgym.scenarios import Preview
@@ -106,15 +106,6 @@ def truth_values(episode_start: npt.ArrayLike, rows: int) -> npt.NDArray[np.bool
 def replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
     """The memory, with some rows those of a fresh one. Shape of ``rows`` (B,)."""
     return tuple(np.where(rows.reshape(-1, *[1] * (k.ndim - 1)), f, k) for k, f in zip(memory, fresh, strict=True))
-
-
-def joined(parts: Sequence[Solution]) -> Solution:
-    """The solutions of one batch's parts as one."""
-    if len(parts) == 1:
-        return parts[0]
-    qdots, memories, status, iterations = zip(*parts, strict=True)
-    memory = tuple(np.concatenate(arrays) for arrays in zip(*memories, strict=True))
-    return Solution(np.concatenate(qdots), memory, np.concatenate(status), np.concatenate(iterations))
 
 
 _FLOAT = np.dtype(np.float64)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from baselines.policy.arguments import joined
+import numpy as np
+
 from baselines.policy.problem import Solution
 from ikgym.parallel import in_chunks
 
@@ -31,4 +32,6 @@ def divided(solve: Callable[[slice], Solution], rows: int, grain: int) -> Soluti
             _sharing.now = False
 
     in_chunks(work, rows, grain)
-    return joined([parts[start] for start in sorted(parts)])
+    qdots, memories, status, iterations = zip(*(parts[start] for start in sorted(parts)), strict=True)
+    memory = tuple(np.concatenate(arrays) for arrays in zip(*memories, strict=True))
+    return Solution(np.concatenate(qdots), memory, np.concatenate(status), np.concatenate(iterations))

@@ -1,5 +1,7 @@
 """The cost of a path against the environment's, its derivatives against central differences."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from tests.baselines.solvers.receding_horizon.data import horizon_cost
 from tests.baselines.solvers.receding_horizon.newton.problems import place
 
 ARMS = ["varga7_literal", "tiago", "zhang3"]
-TASKS = ikgym.tasks.names()
+every_task = pytest.mark.parametrize(("task", "arm"), list(zip(ikgym.tasks.names(), itertools.cycle(ARMS))))
 
 
 def scale_of(task):
@@ -66,8 +68,7 @@ def busy(arm, task, home):
     return next(at for at in places if everything_plays(at))
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("arm", ARMS)
+@every_task
 def test_derivatives_against_central_differences(arm, task):
     at = busy(arm, task, home=ARMS.index(arm) % 2 == 0)
     (value, _, _), blocks = at.linearise()
@@ -93,8 +94,7 @@ def test_other_exponents(p_x):
     assert held[:, : at.error_size].any()
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("arm", ARMS)
+@every_task
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
     qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
