@@ -80,29 +80,6 @@ def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
     assert (held > 0).all() if scenario.name == limited().name else held.any() <= scenario.arm.limited
 
 
-def test_partial_resets_by_mask_put_rows_out_of_step():
-    native, sync = pair(noisy("varga7-random", 9), AutoresetMode.DISABLED)
-    rng = np.random.default_rng(2)
-    identical(native.reset(seed=[5, None, 7]), sync.reset(seed=[5, None, 7]))
-    native.reset(seed=[5, 6, 7])
-    sync.reset(seed=[5, 6, 7])
-    for k in range(40):
-        if k % 4 == 3:
-            mask = np.zeros(N, dtype=bool)
-            mask[k % N] = True
-            seed = None if k % 8 == 3 else 100 + k
-            q = rng.uniform(-1, 1, 7)
-            both = [envs.reset(seed=seed, options={"reset_mask": mask.copy(), "q": q}) for envs in (native, sync)]
-        else:
-            actions = rng.uniform(-1, 1, (N, 7)).astype(np.float32)
-            both = [envs.step(actions) for envs in (native, sync)]
-            ended = both[0][3]
-            if ended.any():
-                for envs in (native, sync):
-                    envs.reset(options={"reset_mask": ended.copy()})
-        assert identical(*both)
-
-
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
 def test_record_episode_statistics(mode):
     steps = 5
