@@ -4,7 +4,7 @@
 |---|---|
 | `run.json` | configuration, seed, versions, machine, computing time, validations, hash of the final weights |
 | `history.json` | a row for each segment: its metrics, and the score if there was a validation |
-| `checkpoint.pt` | the state to resume from |
+| `checkpoint.pt` | the state to resume from, with its SHA-256 |
 | `tensorboard/` | the history, for TensorBoard |
 | `agent.safetensors` | at the end: the agent, a policy of :mod:`baselines` |
 """
@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import io
 import pathlib
 from collections.abc import Mapping
@@ -21,6 +22,8 @@ from baselines.files import ResultsError, read_bytes, read_json, reading, resume
 
 #: The version of `run.json` and of `checkpoint.pt`.
 FORMAT = 3
+#: The first bytes of a checkpoint; the digest of its payload, a line break and the payload follow.
+MAGIC = b"ikgym checkpoint "
 
 
 class Folder:
@@ -98,7 +101,7 @@ class Checkpoint:
 
         stream = io.BytesIO()
         torch.save({"format": FORMAT, **vars(self)}, stream)
-        write(file, stream.getvalue())
+        write(file, sealed(stream.getvalue()))
 
     @classmethod
     def load(cls, file: pathlib.Path) -> Checkpoint:
@@ -110,7 +113,23 @@ class Checkpoint:
         import torch
 
         with reading(file, "Begin anew with --overwrite."):
-            content = torch.load(io.BytesIO(read_bytes(file)), map_location="cpu", weights_only=True)
+            content = torch.load(io.BytesIO(_payload(read_bytes(file))), map_location="cpu", weights_only=True)
             if content.pop("format") != FORMAT:
                 raise ValueError("it has another format")
             return cls(**content)
+
+
+def sealed(payload: bytes) -> bytes:
+    """The content of a checkpoint: magic bytes and digest, then the payload."""
+    return b"".join([MAGIC, hashlib.sha256(payload).hexdigest().encode(), b"\n", payload])
+
+
+def _payload(content: bytes) -> bytes:
+    """The payload of a checkpoint with the right digest."""
+    head, _, payload = content.partition(b"\n")
+    if not head.startswith(MAGIC):
+        raise ValueError("it is no checkpoint")
+    claimed, digest = head.removeprefix(MAGIC).decode(errors="replace"), hashlib.sha256(payload).hexdigest()
+    if digest != claimed:
+        raise ValueError(f"it is damaged: expected the SHA-256 {claimed}, got {digest}")
+    return payload

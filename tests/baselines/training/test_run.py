@@ -14,7 +14,7 @@ from baselines.episodes import rollouts
 from baselines.files import ResultsError
 from baselines.training import run as run_module
 from baselines.training.config import TrainingError
-from baselines.training.folder import FORMAT
+from baselines.training.folder import FORMAT, sealed
 from baselines.training.randomness import deterministic_torch
 from baselines.training.run import train, weights_hash
 from baselines.training.validation import validation_seeds
@@ -200,7 +200,7 @@ def saved(content):
     """A checkpoint with any content."""
     stream = io.BytesIO()
     torch.save(content, stream)
-    return stream.getvalue()
+    return sealed(stream.getvalue())
 
 
 class Evil:
@@ -213,7 +213,7 @@ class Evil:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged"),
+        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
         ("checkpoint.pt", saved({"format": 99}), "it has another format"),
         ("checkpoint.pt", saved({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
         ("run.json", b"{", "run.json is damaged"),
@@ -224,6 +224,15 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ResultsError, match=message):
+        train(CONFIG, 3, tmp_path, resume=True)
+
+
+def test_a_bit_of_a_checkpoint_is_wrong(finished, tmp_path):
+    copied(finished[0], tmp_path)
+    damaged = bytearray((tmp_path / "checkpoint.pt").read_bytes())
+    damaged[-1] ^= 64
+    (tmp_path / "checkpoint.pt").write_bytes(damaged)
+    with pytest.raises(ResultsError, match="expected the SHA-256"):
         train(CONFIG, 3, tmp_path, resume=True)
 
 
