@@ -102,8 +102,7 @@ class Simulator:
         self._parts, self._nominal_shape = [places[key] for key in OBSERVED], seen["nominal"].shape
         self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
         self._take_apart()
-        self._all = np.ones(rows, dtype=np.bool_)
-        self._own_start = np.zeros(rows, dtype=np.bool_)
+        self._all, self._own_start = np.ones(rows, dtype=np.bool_), np.zeros(rows, dtype=np.bool_)
         with announced("the simulation kernels"):
             simulation.first_not_finite(self._state.q, ~self._all)
             self._run(~self._all, self._new(self._count), moving=False)
@@ -135,6 +134,8 @@ class Simulator:
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
+        if len(rows) == 0:
+            return
         own = [generators[row] for row in rows.tolist()]
         episodes = scenario.trajectory.samples(own)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]

@@ -24,7 +24,7 @@ from ikgym.validation import FloatArray, one_a_row
 # Numbers of the streams that other noises of an episode come from: more than there are effects.
 NOISE_SEEDS = 1000
 # Rows whose draws are worth a thread.
-GRAIN = 32
+GRAIN = 64
 Integers = npt.NDArray[np.int64]
 
 
@@ -161,7 +161,8 @@ class PlantRows:
                 offsets, axes, tool, tool_rotation = (array[rows[part], 0] for array in self.arms)
                 q[part] = jogged(q[part], Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation))
 
-        in_chunks(work, len(rows), GRAIN)
+        if self._plant.draws_arm or jogged is not None:
+            in_chunks(work, len(rows), GRAIN)
 
     def _draw(self, rows: Integers, keys: Keys) -> None:
         """Draws the arms of some rows, their drives and sensors, by their keys. Shapes (k,)."""

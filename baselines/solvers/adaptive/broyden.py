@@ -53,7 +53,8 @@ class BroydenNumbers(NamedTuple):
 def broyden_step(model, numbers, seen, memory, answer):
     """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
     answer.iterations[:] = memory.known
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    nominal = NominalMemory(memory.nominal, memory.known)
+    jacobian, shift, error = task_motion(model.chain, model.kind, seen, nominal)
     learn_rows(model.kind, numbers.motion, seen, answer.iterations, memory, jacobian)
     add_feedback(numbers.gain, error, shift)
     damped_rows(jacobian, shift, numbers.damping, answer.qdot)
