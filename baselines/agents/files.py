@@ -29,6 +29,12 @@ KEY: Final = "ikgym"
 MOST_BYTES = 2**28
 #: Digits of a hash that identify an agent in results.
 DIGITS = 12
+#: Strings and numbers that every file contains.
+_PARTS: Final = {
+    "scenario": ("name", "fingerprint"),
+    "arm": ("name", "fingerprint"),
+    "task": ("name", "size", "error_size"),
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -137,6 +143,9 @@ def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) 
     kind: Any = described.get("kind")
     if kind not in kinds:
         raise ResultsError(f"{source}: expected an agent of the kind {' or '.join(kinds)}, got {kind!r}.")
+    for part, names in _PARTS.items():
+        if not all(isinstance(about[part][name], (str, int)) for name in names):
+            raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")
     processing = kinds[kind].from_json(described)
     network = Network.from_json(about["network"], tensors)
     found = _digest(network, about)
