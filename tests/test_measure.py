@@ -23,6 +23,12 @@ def test_tuned_solvers_have_two_rows(name):
     assert len(here) >= 2
 
 
+def test_agents_stand_beside_their_untrained_network():
+    rows = {one["policy"]: one for one in POSE if one["scenario"] == measure.SCENARIO}
+    assert {"agent_alone", "untrained"} <= rows.keys()
+    assert int(rows["untrained"]["seeds"]) == len(measure.SEEDS)
+
+
 def parsed(policy):
     return parse_policy(policy) if registry.known(policy.partition(":")[0]) else (policy, {})
 

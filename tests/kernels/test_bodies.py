@@ -1,3 +1,8 @@
+import json
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -119,3 +124,17 @@ def test_bad_input_is_refused():
             RAIL.clearance(q)
     with pytest.raises(UnknownNameError, match="Did you mean 'tip'"):
         RAIL.clearance(np.zeros(4), [Sphere("ball", [0, 0, 0], 1.0, ignored=("tipp",))])
+
+
+def test_plain_python_measures_the_same():
+    code = (
+        "import json, warnings; warnings.simplefilter('ignore')\n"
+        "from tests.kernels.test_bodies import OBSTACLES, RAIL, near, postures\n"
+        "print(json.dumps([[p, d, *g] for row in near(RAIL, postures(RAIL, 5)) for d, p, g in row]))"
+    )
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    out = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    plain = json.loads(out.stdout)
+    compiled = [[p, d, *g] for row in near(RAIL, postures(RAIL, 5)) for d, p, g in row]
+    assert [tuple(pair) for pair, *_ in plain] == [pair for pair, *_ in compiled]
+    np.testing.assert_allclose([row[1:] for row in plain], [row[1:] for row in compiled], rtol=0, atol=1e-14)

@@ -15,7 +15,12 @@ from baselines.solvers.rivals.model_files import urdf
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 #: Chains of the robots, the number of links that can be the tip, and one that stands above all others of its length.
-CHAINS = {"ur10_rail": ("world", "tool0", 7, 3), "pr2": ("base_link", "r_gripper_tool_frame", 8, 25)}
+CHAINS = {
+    "ur10": ("base_link", "tool0", 6, 2),
+    "ur10_rail": ("world", "tool0", 7, 3),
+    "baxter": ("torso", "left_gripper", 7, 23),
+    "pr2": ("base_link", "r_gripper_tool_frame", 8, 25),
+}
 
 
 @pytest.fixture(autouse=True)

@@ -81,6 +81,9 @@ def test_help_of_each_command(word, capsys):
         (["compare", "panda-line", "--tip", "hand"], "--tip has no effect without a CSV file."),
         (["train", "apg", "--preset", "smok", "--out", "x"], "There is no preset 'smok'. Did you mean 'smoke'?"),
         (["train", "apg", "--out", "x", "--checkpoint-every", "nan"], "checkpoint_every: expected a finite number"),
+        (["train", "apg", "--preset", "smoke", "--preset", "quick", "--out", "x"], "--preset is given twice"),
+        (["evaluate", "--episodes", "1" + 23 * "0"], "episodes: expected 0, or an absolute value from 1e-12 to 1e+12"),
+        (["reproduce", "--out", ""], "--out: expected a value, got an empty text."),
         (["--version", "now"], "--version: expected nothing after it, got now."),
     ],
 )

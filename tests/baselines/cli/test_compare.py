@@ -32,7 +32,7 @@ def test_a_short_path(capsys, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["baxter", "pr2"])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_the_arms_of_the_page(robot, capsys):
     rows, text = compared(robot, FOLDER / f"{robot}.csv", capsys, "--speed", str(ROBOTS[robot].speed))
     lines = [one for one in from_csv((RESULTS / "compare.csv").read_text(encoding="utf-8")) if one["arm"] == robot]

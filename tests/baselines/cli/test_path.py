@@ -15,7 +15,12 @@ from baselines.cli import main
 from baselines.cli.commands import path
 
 ROBOTS = Path(__file__).parents[2] / "robots"
-CHAINS = {"ur10": ("base_link", "tool0"), "pr2": ("base_link", "r_gripper_tool_frame")}
+CHAINS = {
+    "ur10": ("base_link", "tool0"),
+    "ur10_rail": ("world", "tool0"),
+    "baxter": ("torso", "left_gripper"),
+    "pr2": ("base_link", "r_gripper_tool_frame"),
+}
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +40,7 @@ def command(robot, *more):
     return ["path", str(ROBOTS / f"{robot}.csv"), *arm, "--speed", "0.2", "--corner-radius", "0.03", *more]
 
 
-@pytest.mark.parametrize("robot", ["ur10", pytest.param("pr2", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in [*CHAINS][1:])])
 def test_arms_that_are_not_in_the_catalogue(robot, capsys):
     limits = ("--acceleration", "5") if robot != "pr2" else ()
     assert main(command(robot, "--retime", "out.toml", *limits)) == 0

@@ -111,5 +111,5 @@ def test_some_faults(name):
 
 
 @pytest.mark.slow
-def test_200_faults():
-    check("panda", 200, seed=7)
+def test_500_faults():
+    check("panda", 500, seed=7)

@@ -1,5 +1,6 @@
 """The command line of training: exit codes, several seeds, repetition."""
 
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -137,6 +138,13 @@ def test_a_run_that_ends_early(patched, error, code, message, tmp_path, monkeypa
     monkeypatch.setattr(*patched, fails)
     assert main(["apg", *TINY, "--out", str(tmp_path)]) == code
     assert message in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tensorboard" else find(name))
+    assert main(["apg", *TINY, "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == 'error: Training needs tensorboard: pip install "ikgym[train]"\n'
 
 
 @pytest.mark.slow

@@ -15,7 +15,12 @@ import ikgym
 from baselines.cli import main
 
 ROBOTS = Path(__file__).parents[3] / "robots"
-CHAINS = {"ur10": ("base_link", "tool0"), "ur10_rail": ("world", "tool0")}
+CHAINS = {
+    "ur10": ("base_link", "tool0"),
+    "ur10_rail": ("world", "tool0"),
+    "baxter": ("torso", "left_gripper"),
+    "pr2": ("base_link", "r_gripper_tool_frame"),
+}
 SCENARIO = """
 name = "{robot}"
 task = "pose"
@@ -63,7 +68,7 @@ def played(file):
     return [name.partition(" [")[0] for name in head[1 : n + 1]], table[:, 0], table[:, 1 : n + 1], hardest
 
 
-@pytest.mark.parametrize("robot", ["ur10", pytest.param("ur10_rail", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in [*CHAINS][1:])])
 def test_from_urdf_to_messages(robot, tmp_path):
     file = scenario_file(robot, tmp_path)
     words = ["--scenarios", str(file), "--policies", "qp", "--out", str(tmp_path / "out"), "--no-report"]

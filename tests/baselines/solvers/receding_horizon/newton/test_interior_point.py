@@ -35,6 +35,10 @@ def check(states):
         assert max(beyond_limits(problem, horizon, path, braking=True).values()) < 1e-9
 
 
+def test_optimum_is_ipopts():
+    check(GOLDEN[8:13])
+
+
 @pytest.mark.slow
 def test_optimum_is_ipopts_on_50_states():
     assert len(GOLDEN) == 50
