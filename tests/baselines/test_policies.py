@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Mapping
 
 import gymnasium as gym
 import numpy as np
@@ -30,7 +31,10 @@ from baselines.wrapper import Wrapper
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
+from ikgym.plant import DrawnPlant
 from ikgym.plant.draw import Draws
+from ikgym.plant.rows import PlantRows
+from ikgym.simulator import Simulator
 from tests.baselines.making import made, two_actions, usual
 from tests.comparison import identical
 
@@ -216,6 +220,45 @@ def test_only_those_with_a_tolerance_say_that_they_have_converged(name):
         assert policy.report(state).status[0] > Status.CONVERGED
 
 
+def reachable(thing, seen=None):
+    """All objects that an object holds, however deep."""
+    seen = {} if seen is None else seen
+    if id(thing) in seen or isinstance(thing, (str, bytes, type, np.ndarray)):
+        return seen.values()
+    seen[id(thing)] = thing
+    inside = list(getattr(thing, "__dict__", {}).values())
+    if isinstance(thing, Mapping):
+        inside += thing.values()
+    elif isinstance(thing, (tuple, list, set)):
+        inside += thing
+    for value in inside:
+        reachable(value, seen)
+    return seen.values()
+
+
+HIDDEN = (ikgym.Scenario, gym.Env, gym.vector.VectorEnv, Simulator, ikgym.Plant, DrawnPlant, Draws, PlantRows)
+
+
+@every_contender
+def test_a_policy_holds_the_model_and_never_the_arm_or_its_plant(name):
+    on = next(on for on in ("khan8-q7q8", usual(name)) if policy_for(name, on))  # the first has another arm
+    policy = policy_for.__wrapped__(name, on)  # a new one: what it compiles when it is asked is a maze of numba's
+    for thing in reachable(policy):
+        assert not isinstance(thing, HIDDEN)
+        assert not isinstance(thing, ikgym.Arm) or thing is scenario(on).model
+
+
+def test_that_guard_would_notice():
+    told = scenario("iiwa14-random").replace(plant=ikgym.Plant(zero=0.1))
+
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Told(get("dls")):
+        plant: object = dataclasses.field(kw_only=True, default=None)
+
+    policy = Told(Problem.of(told), plant=told.drawn_plant(1))
+    assert any(isinstance(thing, HIDDEN) for thing in reachable(policy))
+
+
 @every_contender
 def test_the_arm_and_the_plant_that_move_change_no_answer(monkeypatch, name):
     """Same observations, same model, another arm and another plant, which nobody may ask for what it draws."""
@@ -240,7 +283,7 @@ def test_the_arm_and_the_plant_that_move_change_no_answer(monkeypatch, name):
         states = [state for _, state in answers]
 
 
-@pytest.mark.parametrize("name", ["dls", "rhc_gradient", "smoothed"])
+@pytest.mark.parametrize("name", ["dls", "rhc_gradient", "smoothed", "calibrated", "pink", "agent_alone", "follow_nominal"])
 def test_works_inside_evaluate_policy_with_several_environments(name):
     short = ikgym.scenarios.get(usual(name)).replace(steps=12)
     policy = made(name, short)

@@ -1,5 +1,7 @@
 """Waypoints from arrays and CSV files."""
 
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -61,6 +63,27 @@ def test_a_file_gives_what_its_arrays_give(tmp_path):
     text = "\ufeffz,x,y\n" + "\n".join(",".join(map(repr, row[[2, 0, 1]].tolist())) for row in POINTS)
     got = from_csv(written(tmp_path, text), speed=0.5, acceleration=2.0, corner_radius=0.05)
     np.testing.assert_array_equal(got.path.points, POINTS)
+
+
+TIMING = {"speed": 1.0, "acceleration": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("rows", "given"),
+    [
+        (50_000, TIMING),
+        *(pytest.param(200_000, one, marks=pytest.mark.slow) for one in (TIMING, TIMING | {"corner_radius": 1e-4}, {})),
+    ],
+)
+def test_the_largest_file_takes_seconds(rows, given, tmp_path):
+    """The time of the process, since other tests run beside it; samples of all intervals at once took 35 s, 5.9 GiB."""
+    s = 0.01 * np.arange(rows)
+    columns = [np.cos(s), np.sin(s), 0.01 * s, np.cos(s), np.sin(s), 0.0 * s, 0.0 * s, s][: 7 if given else 8]
+    file, head = tmp_path / "points.csv", ",".join(HEAD.split(",")[: len(columns)]).strip()
+    np.savetxt(file, np.column_stack(columns), delimiter=",", header=head, comments="", fmt="%.6f")
+    begin = time.process_time()
+    from_csv(file, **given).frames(np.linspace(0.0, 1.0, 1000), ARM)
+    assert time.process_time() - begin < 10.0 * rows / 200_000
 
 
 @pytest.mark.parametrize(

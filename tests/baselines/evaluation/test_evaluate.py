@@ -254,6 +254,10 @@ def test_a_trajectory_log_that_is_missing_is_played_again(tmp_path):
 
 def test_resuming_adds_episodes_and_policies(tmp_path):
     evaluate("varga7-random", "dls", steps=5, out=tmp_path)
+    before = (tmp_path / "results.json").read_bytes()
+    with pytest.raises(ResultsError, match=r"results\.json already exists: continue with --resume"):
+        evaluate("varga7-random", "dls", episodes=2, steps=5, out=tmp_path)
+    assert (tmp_path / "results.json").read_bytes() == before
     rows = evaluate("varga7-random", "dls", episodes=2, steps=5, out=tmp_path, resume=True)
     assert [row.seed for row in rows] == [2_000_000, 2_000_001]
     evaluate("varga7-random", "moore_penrose", steps=5, out=tmp_path, resume=True)

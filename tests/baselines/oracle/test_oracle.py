@@ -44,9 +44,11 @@ CASES = {
     "off the path": (short(start=np.full(7, 0.01)), 0),
     "held": (short("khan8-q7q8", 130), 0),
     "held at times": (short(iterations_per_point=(3, 1, 1, 2, 1)), 0),
+    "ends while a point is held": (short(steps=8, iterations_per_point=3), 0),
     "another measured start": (short("zhang3-helix"), 0),
     "position": (short("faitli3-regular"), 0),
     "pose": (short("zhang6-lspb"), 0),
+    "axis": (short("zhang6-lspb", task=ikgym.tasks.get("axis")), 0),
     "narrow limits": (short(velocity_limit=np.full(7, 5.0)), 0),
     "one step": (short(steps=1), 0),
 }

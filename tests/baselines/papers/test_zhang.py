@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.papers.runs import Runs
-from baselines.papers.zhang import claims
+from baselines.papers.zhang import claims, section_5
 from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn
 from baselines.registry import make
 from baselines.status import Status
@@ -43,3 +43,8 @@ def test_damping_tolerates_a_wrong_model(trial):
     assert lost(0.0, 0.45) == 1.0
     assert lost(SHARES[-1], 0.45) < 0.5
     assert lost(0.0, 0.55) == 0.0
+
+
+def test_the_inverse_of_rule_18_takes_as_long_under_conditions():
+    """The one claim of this paper on times whose verdict does not depend on the machine."""
+    assert section_5.inverse_of_18(Runs()).verdict == "depends"

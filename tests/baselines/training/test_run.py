@@ -2,6 +2,7 @@
 
 import io
 import multiprocessing
+import signal
 import time
 
 import numpy as np
@@ -106,14 +107,14 @@ def test_the_agent_plays_as_in_validation(finished):
     assert np.exp(np.mean(np.log(costs))) == pytest.approx(result.score.cost, rel=1e-12)
 
 
-@pytest.mark.slow  # those stopped in this process, above and below, always run
-def test_killed_at_random_moments(tmp_path):
+@pytest.mark.parametrize("kills", [1, pytest.param(4, marks=pytest.mark.slow)])
+def test_killed_at_random_moments(tmp_path, kills):
     """While it is trained: from the time on at which its folder is there."""
     config, rng = tiny(segments=8, evaluate_every=4), np.random.default_rng()
     begin = time.monotonic()
     train(config, 3, tmp_path / "undisturbed")
-    longest, folder = time.monotonic() - begin, tmp_path / "killed"
-    for _ in range(3):
+    longest, folder, killed = time.monotonic() - begin, tmp_path / "killed", 0
+    while killed < kills:
         process = FORK.Process(target=train, args=(config, 3, folder), kwargs={"resume": True}, daemon=True)
         process.start()
         while process.is_alive() and not (folder / "run.json").exists():
@@ -121,6 +122,11 @@ def test_killed_at_random_moments(tmp_path):
         process.join(longest * rng.random())
         process.kill()
         process.join()
+        assert process.exitcode in (0, -signal.SIGKILL)
+        killed += process.exitcode != 0
+        if process.exitcode == 0:  # it was quicker
+            assert_same_run(tmp_path / "undisturbed", folder)
+            folder, longest = tmp_path / f"{longest}", 0.5 * longest
     train(config, 3, folder, resume=True)
     assert_same_run(tmp_path / "undisturbed", folder)
 

@@ -169,3 +169,18 @@ class TestExtended:
             observation = observed(REGULAR, q)
             np.testing.assert_allclose(observation["pose"], observation["nominal"][0], atol=1e-9)
             assert stepped(policy, observation)[2] == wanted
+
+
+def largest_error(transformation, a, steps=3000):
+    scenario = ikgym.scenarios.get(BENT).replace(steps=steps)
+    given = {"transformation": transformation, "a": a, "iterations": 1, "components": (0, 1)}
+    track = baselines.track(scenario, baselines.make("fixed_point", scenario, **given))
+    return track.position_error[scenario.counted()[1:]].max()
+
+
+def test_the_sign_works_for_two_joints():
+    """Where both eigenvalues keep one sign: without a Jacobian, and by growth whatever the sign of A."""
+    assert largest_error("sign", 1.0) < 1e-3
+    assert largest_error("sign", -1.0, 1000) > 0.1
+    for a in (1.0, -1.0):
+        assert largest_error("sign_by_growth", a) < 5e-3

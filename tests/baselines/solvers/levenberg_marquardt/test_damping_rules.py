@@ -23,6 +23,14 @@ def now(rule, error=1.0, condition=1.0, stepped=np.nan, **numbers):
     return damping_now(law(rule, **numbers), error, condition, stepped)
 
 
+def test_a_bound_belongs_to_the_interval_behind_it():
+    """(37), and Table I: rows by the error, columns by the condition."""
+    numbers = {"condition_bounds": (10, 100), "dampings": (0, 0.1, 0.5)}
+    assert [now("condition", condition=at, **numbers) for at in (9.9, 10.0, 99.0, np.inf)] == [0.0, 0.1, 0.1, 0.5]
+    numbers = {"error_bounds": (1.0,), "condition_bounds": (10.0,), "dampings": ((0, 1), (2, 3))}
+    assert [now("table", *at, **numbers) for at in ((0.5, 5), (0.5, 10), (1.0, 5), (1e9, 1e9))] == [0, 1, 2, 3]
+
+
 @pytest.mark.parametrize(
     ("restart", "error", "before", "wanted"),
     [

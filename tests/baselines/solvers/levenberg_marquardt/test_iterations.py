@@ -146,6 +146,26 @@ def sliding_arm(n):
     return HELIX.replace(arm=arm, model=arm, start=start, initial_pose=None, velocity_limit=limit)
 
 
+@pytest.mark.parametrize("one_step", [False, True])
+def test_with_one_point_it_is_mfac(one_step):
+    scenario = ikgym.scenarios.get("zhang6-lspb")
+    batch, numbers = problems(scenario, 1), {"iterations": 20, "tolerance": 1e-10, "one_step": one_step}
+    for rule in ("threshold", "sugihara"):
+        given = numbers | {"rule": rule} | RULES[rule]
+        one, other = solve("mfac", scenario, batch, **given), solve("mfapc", scenario, batch, horizon=1, **given)
+        for mine, theirs in zip((*one[:1], *one.memory), (*other[:1], *other.memory), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
+def test_with_damping_the_points_ahead_pull_it_past_the_first():
+    """One prismatic joint, two points v apart: the rest point of the iteration is λ v / (g + 2λ) past the first."""
+    nominal = np.array([[[1.0, 0, 0], [1.3, 0, 0]]])
+    numbers = {"horizon": 2, "rule": "constant", "damping": 0.5, "iterations": 200}
+    solution = solve("mfapc", sliding_arm(1), batch_of(sliding_arm(1), np.zeros((1, 1)), nominal), **numbers)
+    assert solution.qdot[0, 0] == pytest.approx(1.0 + 0.5 * 0.3 / (1 + 2 * 0.5), rel=1e-12)
+    assert solution.status[0] == Status.ITERATION_LIMIT
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.5])
 def test_error_on_a_ramp(damping):
     """(10): one step a period leaves U diag(λ/σ²) Uᵀ v, for a ramp of velocity v."""

@@ -7,6 +7,10 @@ import pytest
 
 import ikgym
 from baselines.solvers.receding_horizon.newton.cost import true_cost
+from baselines.solvers.receding_horizon.newton.second_order import second_order
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.kinematics import forward_and_jacobian
 from tests.baselines.solvers.receding_horizon.data import horizon_cost
 from tests.baselines.solvers.receding_horizon.newton.problems import place
 
@@ -66,6 +70,28 @@ def busy(arm, task, home):
     """A place of which no term is idle; the first one drawn, as a rule."""
     places = (place(arm, task, seed=seed, home=home, delta_x=scale_of(task)) for seed in range(50))
     return next(at for at in places if everything_plays(at))
+
+
+@every_task
+def test_second_derivatives_of_the_error_alone(arm, task):
+    """Of any weighted sum of its components; a pose has reached its orientation, and is anywhere else."""
+    arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(0)
+    n, workspace = arm.joints, knot_workspace(task.kind, task.size, arm.joints)
+    workspace.gradient[:] = rng.normal(size=task.error_size)
+    for q in (np.zeros(n), *rng.uniform(-2.0, 2.0, (2, n))):
+        nominal = task.coordinates(*arm.forward(q))
+        nominal[-3:] += rng.normal(size=3)
+
+        def weighted(here, nominal=nominal):
+            return workspace.gradient @ task.error(nominal, task.coordinates(*arm.forward(here)))
+
+        central = differences(lambda a, q=q: differences(weighted, a, 1e-3), q, 1e-3)
+        out = np.empty((n, n))
+        forward_and_jacobian(arm.chain, q, workspace.rotation, workspace.position, workspace.geometric)
+        task_kernels.coordinates(task.kind, workspace.rotation, workspace.position, workspace.pose)
+        task_kernels.error(task.kind, nominal, workspace.pose, workspace.error)
+        second_order(task.kind, workspace, out)
+        np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
 
 
 @every_task
