@@ -1,5 +1,6 @@
 """The single environment against its specification, Gymnasium's checker and Stable-Baselines3's."""
 
+import functools
 import re
 import warnings
 

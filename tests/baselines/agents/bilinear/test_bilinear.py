@@ -117,7 +117,8 @@ def test_the_inverse_jacobian_removes_the_error(task):
 
 
 @pytest.mark.parametrize(
-    ("arm", "task"), [("varga7", "pose"), ("varga7", "skew"), ("varga7", "position"), ("tiago", "axis"), ("planar2", "matrix")]
+    ("arm", "task"),
+    [("varga7", "pose"), ("varga7", "skew"), ("varga7", "position"), ("tiago", "axis"), ("planar2", "matrix")],
 )
 def test_gradients_of_features(arm, task):
     problem = problem_of(arm, task)

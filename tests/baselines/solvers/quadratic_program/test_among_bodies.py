@@ -67,8 +67,9 @@ def test_a_batch_is_its_rows(name):
         assert identical(policy.predict(row)[0], action)
 
 
-def test_follows_where_there_is_a_way():
-    follows(ikgym.scenarios.get("panda-table"))
+@pytest.mark.parametrize("name", ["panda-table", "panda-shelf", "panda-hand"])
+def test_follows_where_there_is_a_way(name):
+    follows(ikgym.scenarios.get(name))
 
 
 def test_null_space_leads_away():
