@@ -283,9 +283,7 @@ def test_the_arm_and_the_plant_that_move_change_no_answer(monkeypatch, name):
         states = [state for _, state in answers]
 
 
-@pytest.mark.parametrize(
-    "name", ["dls", "rhc_gradient", "smoothed", "calibrated", "pink", "agent_alone", "follow_nominal"]
-)
+@every_policy
 def test_works_inside_evaluate_policy_with_several_environments(name):
     short = ikgym.scenarios.get(usual(name)).replace(steps=12)
     policy = made(name, short)

@@ -71,7 +71,7 @@ TIMING = {"speed": 1.0, "acceleration": 1.0}
 @pytest.mark.parametrize(
     ("rows", "given"),
     [
-        (50_000, TIMING),
+        (100_000, TIMING),
         *(pytest.param(200_000, one, marks=pytest.mark.slow) for one in (TIMING, TIMING | {"corner_radius": 1e-4}, {})),
     ],
 )

@@ -153,6 +153,8 @@ def test_the_agent_of_the_package():
     assert (about["training"]["method"], about["scenario"]["name"]) == ("apg", "varga7-random")
     with pytest.raises(InvalidInputError, match="hash: expected"):
         baselines.make("agent_alone", RANDOM, hash="0" * 12)
+    with pytest.raises(InvalidInputError, match="was trained for the arm varga7"):
+        baselines.make("agent_alone", PANDA)
 
 
 def test_the_agent_of_an_environment_by_id_follows_another_panda():
