@@ -31,7 +31,7 @@ def check_driven(retimed):
 
 
 @pytest.mark.parametrize(
-    "path", [PATHS[2], pytest.param(PATHS[3], marks=pytest.mark.slow)], ids=["tiago-fast", "panda-square"]
+    "path", [pytest.param(path, marks=() if path[0] == "tiago-fast" else pytest.mark.slow) for path in PATHS], ids=str
 )
 def test_a_path_that_is_too_fast(path):
     scenario = faster(*path)
