@@ -77,7 +77,8 @@ def test_steps_close_to_the_largest_are_found():
     frame = whole.scenario.trajectory.frames(routes.times[:1], None)[0]
     start, met = whole.scenario.arm.inverse(frame[:9].reshape(3, 3), frame[9:], start=near)
     steps = np.abs(np.diff(routes.route(start), axis=0)).max(axis=1) / routes.largest[0]
-    assert met and len(steps) == 11
+    assert met
+    assert len(steps) == 11
     assert 0.99 < steps.max() < 1.0
 
 
