@@ -136,7 +136,8 @@ class Routes:
         direction = np.linalg.svd(jacobian).Vh[:, -1]
         middle, half = _room(moves, direction)
         half = ASIDE[-1] * np.maximum(half, 0.0)
-        return np.clip(0.0, middle - half, middle + half)[:, None] * direction
+        out: FloatArray = np.clip(0.0, middle - half, middle + half)[:, None] * direction
+        return out
 
     def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""
