@@ -21,7 +21,7 @@ from tqdm import tqdm
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
-from baselines.files import ResultsError, locked, resumed, write_json
+from baselines.files import ResultsError, locked, reading, resumed, write_json
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from ikgym import scenarios
@@ -100,7 +100,8 @@ def write(
                 bar.update(min(BLOCK, episodes - number))
         whole = _storage(_environment(first), draft)
         for block in sorted(blocks.iterdir()):
-            whole.update_from_storage(MinariStorage.read(block))
+            with reading(block, "Begin anew with --overwrite."):
+                whole.update_from_storage(MinariStorage.read(block))
         # Minari loses the seeds when it copies episodes.
         seeds = [{"seed": job.seeds.seed} for job in jobs]
         whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])

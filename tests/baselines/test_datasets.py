@@ -128,6 +128,18 @@ def test_a_block_that_is_written_is_not_played_again(tmp_path, monkeypatch, writ
     assert same(tmp_path / "dls-v0", written)
 
 
+def test_a_damaged_block_is_refused(tmp_path, monkeypatch):
+    real = datasets._record
+
+    def record(jobs, folder):
+        real(jobs, folder)
+        (folder / "main_data.hdf5").write_bytes(b"nothing")
+
+    monkeypatch.setattr(datasets, "_record", record)
+    with pytest.raises(ResultsError, match="000000: Unable to"):
+        write(**GIVEN, out=tmp_path / "dls-v0")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
