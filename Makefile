@@ -63,7 +63,7 @@ results/demo/report.html: | $(STAMP)
 bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks
 
-rivals: $(STAMP) ## Install the solvers and environments that bench compares with (1.2 GB)
+rivals: $(STAMP) ## Install the solvers and environments that bench compares with
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[rivals]"
 
 clean: ## Remove .venv, results and caches

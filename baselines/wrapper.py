@@ -57,7 +57,7 @@ class Wrapper(SolverPolicy, abc.ABC):
     inner: SolverPolicy | None = dataclasses.field(init=False, repr=False)
 
     def own_memory(self, rows: int) -> Memory:
-        """The wrapper's own memory at the start of an episode, preferably a NamedTuple."""
+        """The wrapper's own memory at the start of B episodes, preferably a NamedTuple; arrays of shape (B, …)."""
         del rows
         return ()
 

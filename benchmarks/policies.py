@@ -12,28 +12,30 @@ from baselines.solvers.rivals.base import Rival
 from benchmarks.measuring import FULL, Effort
 from benchmarks.table import Table
 
-SCENARIO, POLICIES = "panda-circle", ("dls", "qp", "sns", "pink", "mink")
+#: Policies by scenario. In the second one the Panda has a hand, and ten boxes around it.
+POLICIES = {"panda-circle": ("dls", "qp", "sns", "pink", "mink"), "panda-clutter-random": ("dls", "null_space", "qp")}
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
     """Times of `predict`."""
     return [
         Table(
-            f"One predict in {SCENARIO}",
+            f"One predict in {scenario}",
             f"One arm, the first {effort.steps} steps of an episode, one policy after the other; × env.step: the "
             "median over that of a step of the environment through `gym.make`, in turn with the calls; library: the "
             "median of the calls of another project's library alone, in turn with `predict`, which contains them.",
             ("median [µs]", "99th percentile [µs]", "× env.step", "library [µs]"),
-            {name: _episode(name, effort.steps) for name in POLICIES},
+            {name: _episode(scenario, name, effort.steps) for name in names},
         )
+        for scenario, names in POLICIES.items()
     ]
 
 
-def _episode(name: str, steps: int) -> tuple[float, float, float, float | None]:
+def _episode(scenario: str, name: str, steps: int) -> tuple[float, float, float, float | None]:
     """Median and 99th percentile of the time of a call, the median over that of a step, and a library's own."""
-    policy = baselines.make(name, SCENARIO)
-    env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=policy.preview)
-    usual = gym.make("RedundantIK-v0", scenario=SCENARIO)  # its step takes no longer if a policy looks far ahead
+    policy = baselines.make(name, scenario)
+    env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
+    usual = gym.make("RedundantIK-v0", scenario=scenario)  # its step takes no longer if a policy looks far ahead
     observation, _ = env.reset(seed=0)
     usual.reset(seed=0)
     policy.predict(observation)

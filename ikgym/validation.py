@@ -28,7 +28,7 @@ SMALLEST, LARGEST = 1e-12, 1e12
 def float_array(
     name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
 ) -> FloatArray:
-    """A fresh, C-contiguous float64 copy of finite numbers; in a shape None is any length, `at_most` is absolute."""
+    """A fresh, C-contiguous float64 copy of finite numbers up to an absolute value; None in a shape is any length."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiub":
@@ -190,7 +190,12 @@ class Frozen:
     """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled."""
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
+        """A copy with some fields changed, checked like a new one.
+
+        Raises:
+            UnknownNameError: There is no field of that name.
+            InvalidInputError: A new value is refused.
+        """
         known_names(f"field of {type(self).__name__}", changes, self._fields())
         return type(self)(**{**self._fields(), **changes})
 

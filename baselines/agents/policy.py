@@ -68,7 +68,6 @@ class LearnedPolicy(SolverPolicy):
     bounds: Bounds | None = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
-    from_file: ClassVar[bool] = True
 
     def _take(self, file: AgentFile, *, any_arm: bool = False) -> None:
         """Uses the agent of a file.

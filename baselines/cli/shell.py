@@ -85,7 +85,7 @@ def run_resumable(
     def both() -> int:
         nonlocal out
         options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
-        out = getattr(options, "out")  # noqa: B009  # a folder, or None
+        out = getattr(options, "out", None)
         for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
             if (value := getattr(options, name, None)) is not None:
                 whole_number(name, value, at_least=1, at_most=most)

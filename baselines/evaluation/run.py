@@ -66,7 +66,7 @@ def evaluate(
 def carry_out(
     options: Options, *, command: str = "baselines.evaluate.evaluate(…)", show: Callable[[Rows], None] | None = None
 ) -> Rows:
-    """See :func:`evaluate`. The files state the command; `show` is called with the rows before they are written."""
+    """See :func:`evaluate`. The files state the command; `show` is called with the rows before the report."""
     jobs, skipped = plan(options)
     workers = Workers(options.workers, options.cluster)
     workers.check()

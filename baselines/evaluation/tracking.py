@@ -106,11 +106,15 @@ class Tracking:
         return out
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
-        """Writes one line a step; the head has the units, NaN is an empty cell."""
+        """Writes one line a step; the head has the units, NaN is an empty cell.
+
+        Raises:
+            ResultsError: The file cannot be written.
+        """
         write(pathlib.Path(file), table(self.columns()))
 
     def to_joint_trajectory(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
-        """Writes the joint motion, from rest to rest, as a ROS 2 `JointTrajectory` in JSON.
+        """Writes the joint motion, from rest to rest, as a ROS 2 `JointTrajectory` in JSON; accelerations on request.
 
         Raises:
             InvalidInputError: The episode ends in motion, and has no room to stop.

@@ -27,12 +27,19 @@ Errors = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Retimed:
-    """A scenario that can be driven."""
+    """A scenario that can be driven.
 
-    scenario: Scenario  # the path from the best start, in the time of `qp`
-    duration: float  # that time, in [s]
-    asked: float  # the time that was asked for, in [s]
-    motion: Motion  # the motion of `qp` that was checked
+    Args:
+        scenario: The path from the best start, in the time of `qp`.
+        duration: That time, in [s].
+        asked: The time that was asked for, in [s].
+        motion: The motion of `qp` that was checked.
+    """
+
+    scenario: Scenario
+    duration: float
+    asked: float
+    motion: Motion
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ ASIDE, DIRECTIONS = np.linspace(-0.98, 0.98, 5), 3
 FIRST_ORDER, CORRECTIONS = 1.3, 2
 #: Share of the largest motion that is used, and distance in [m] and angle in [rad] within which a pose is met.
 USED, TOLERANCE = 0.999, 1e-9
-#: Between two knots bodies are checked at these parts of the way.
+#: Between two knots bodies are checked at these parts of the way, which are even.
 PARTS = (0.25, 0.5, 0.75, 1.0)
 #: Postures are left out whose Jacobian, in units of the largest motions, has less than this on a diagonal.
 SINGULAR = 1e-6
@@ -136,7 +136,8 @@ class Routes:
         direction = np.linalg.svd(jacobian).Vh[:, -1]
         middle, half = _room(moves, direction)
         half = ASIDE[-1] * np.maximum(half, 0.0)
-        return np.clip(0.0, middle - half, middle + half)[:, None] * direction
+        out: FloatArray = np.clip(0.0, middle - half, middle + half)[:, None] * direction
+        return out
 
     def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""

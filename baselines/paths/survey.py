@@ -38,33 +38,54 @@ CLOSE, CLEAR = 0.003, 0.05
 
 
 class Contact(NamedTuple):
-    """How close bodies come to each other and to obstacles along a path."""
+    """How close bodies come to each other and to obstacles along a path.
 
-    clearance: float  # the smallest signed distance until they touch, in [m]
-    pair: tuple[str, str]  # the names of the two that are closest, or that touch
-    time: float  # when they do, were the motion as fast as asked, in [s]
-    touched: bool  # whether they touch, so that the path cannot be followed further
+    Attributes:
+        clearance: The smallest signed distance until they touch, in [m].
+        pair: The names of the two that are closest, or that touch.
+        time: When they do, were the motion as fast as asked, in [s].
+        touched: Whether they touch, so that the path cannot be followed further.
+    """
+
+    clearance: float
+    pair: tuple[str, str]
+    time: float
+    touched: bool
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Branch:
-    """A joint motion along the path from one start."""
+    """A joint motion along the path from one start.
 
-    start: FloatArray  # joint coordinates in [rad] or [m]. Shape (n,)
-    given: bool  # whether the scenario states this start
-    slowing: float  # how many times the time asked for the motion took, the first one that reaches the whole path
-    reached: float  # share of the path's poses that are reached before the first that is not
-    position_error: float  # the largest in [m]
-    orientation_error: float  # the largest in [rad]; 0 where the task has no orientation
-    # the largest joint velocities, were this motion as fast as asked, in [rad/s] or [m/s]. Shape (n,)
+    Args:
+        start: Joint coordinates in [rad] or [m]. Shape (n,).
+        given: Whether the scenario states this start.
+        slowing: How many times the time asked for the motion took, the first one that reaches the whole path.
+        reached: Share of the path's poses that are reached before the first that is not.
+        position_error: The largest in [m].
+        orientation_error: The largest in [rad]; 0 where the task has no orientation.
+        velocity: The largest joint velocities, were this motion as fast as asked, in [rad/s] or [m/s]. Shape (n,).
+        acceleration: The same of accelerations, in [rad/s²] or [m/s²]. Shape (n,).
+        leap: The largest share of a velocity limit in the first control period, from rest.
+        room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
+        contact: How close bodies come; None where nothing can meet.
+        shortest: The shortest timing of this motion in which all limits hold; None if poses are missed.
+        asked: The same, nowhere faster than asked.
+    """
+
+    start: FloatArray
+    given: bool
+    slowing: float
+    reached: float
+    position_error: float
+    orientation_error: float
     velocity: FloatArray
-    acceleration: FloatArray  # the same of accelerations, in [rad/s²] or [m/s²]. Shape (n,)
-    leap: float  # the largest share of a velocity limit in the first control period, from rest
-    # the least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,)
+    acceleration: FloatArray
+    leap: float
     room: FloatArray
-    contact: Contact | None  # how close bodies come; None where nothing can meet
-    shortest: Timing | None  # the shortest timing of this motion in which all limits hold; None if poses are missed
-    asked: Timing | None  # the same, nowhere faster than asked
+    contact: Contact | None
+    shortest: Timing | None
+    asked: Timing | None
 
     @property
     def whole(self) -> bool:
@@ -92,11 +113,17 @@ class Branch:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Survey:
-    """The start branches of a path."""
+    """The start branches of a path.
+
+    Args:
+        scenario: The scenario.
+        duration: The time that is asked for, in [s].
+        branches: The best first.
+    """
 
     scenario: Scenario
-    duration: float  # the time that is asked for, in [s]
-    branches: tuple[Branch, ...]  # the best first
+    duration: float
+    branches: tuple[Branch, ...]
 
     @property
     def best(self) -> Branch:

@@ -24,7 +24,11 @@ class Orientation(Frozen, abc.ABC):
     """The orientation of a tool as a function of the arc length of its path."""
 
     def check(self, path: Path) -> None:
-        """Checks that the law suits a path."""
+        """Checks that the law suits a path.
+
+        Raises:
+            InvalidInputError: It does not.
+        """
         del path
 
     @abc.abstractmethod

@@ -63,9 +63,8 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
         points.append(_interval(axes, float(line["time_p99_us"]), line, ms=7.0, lw=1.2, ls="", **look))
     _logarithmic(axes)
     style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel="cost above the reference [%]")
-    style.legend(
-        drawn, f"{title}: cost against time, and the Pareto front", points, [str(one["policy"]) for one in named]
-    )
+    title = style.literal(f"{title}: cost against time, and the Pareto front")
+    style.legend(drawn, title, points, [style.literal(str(one["policy"])) for one in named])
     return drawn
 
 
@@ -86,8 +85,10 @@ def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
                 _interval(axes, float(steps), line, marker="o", ms=4.5, color=style.looks(place)["color"])
         _logarithmic(axes)
         axes.xaxis.set_major_locator(FixedLocator(sorted({int(line["foresight"]) for line in here})))
-        style.dress(axes, xlabel="foresight [steps]", ylabel="cost above the reference [%]", title=str(scenario))
-    names = [f"{by.replace('_', ' ')}: {value}" for value in series]
+        style.dress(
+            axes, xlabel="foresight [steps]", ylabel="cost above the reference [%]", title=style.literal(str(scenario))
+        )
+    names = [style.literal(f"{by.replace('_', ' ')}: {value}") for value in series]
     style.legend(drawn, title, handles, names)
     return drawn
 
@@ -122,7 +123,7 @@ def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> AxesImage:
         colour = "white" if float(ratio) > np.sqrt(CUT) else style.INK
         axes.text(x, y, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
     shade = axes.imshow(np.clip(ratios, 1.0, CUT), norm=LogNorm(1.0, CUT), cmap="viridis_r", origin="lower")
-    axes.set_title(policy, fontsize=style.MEDIUM, loc="left")
+    axes.set_title(style.literal(policy), fontsize=style.MEDIUM, loc="left")
     axes.set_xticks(range(len(knowledge)), [f"{one:g}" for one in knowledge], fontsize=style.SMALL)
     axes.set_yticks(range(len(drives)), [f"{one:g}" for one in drives], fontsize=style.SMALL)
     axes.set_xlabel("severity of calibration, payload and camera", fontsize=style.SMALL)

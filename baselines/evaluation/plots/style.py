@@ -51,6 +51,11 @@ def small_png(drawn: Figure) -> bytes:
     return out.getvalue()
 
 
+def literal(text: str) -> str:
+    """A text that matplotlib shows letter by letter: a formula between dollars in a name may be none."""
+    return text.replace("$", r"\$")
+
+
 def dress(axes: Axes, *, ylabel: str, xlabel: str = "", title: str = "", ticks: int = 8) -> None:
     """Labels, a pale grid and no frame but the axes."""
     axes.set_ylabel(ylabel, fontsize=MEDIUM)

@@ -45,7 +45,7 @@ def draw(title: str, log: TrajectoryLog) -> Figure:
         _line(axes, log["time"], actual)
         _limit(axes, nominal, actual)
         style.dress(axes, ylabel=f"{letter} [m]", xlabel="time [s]", ticks=4)
-    style.legend(drawn, title, axes.lines, ["nominal", "actual"])
+    style.legend(drawn, style.literal(title), axes.lines, ["nominal", "actual"])
     drawn.align_ylabels()
     return drawn
 
