@@ -41,7 +41,7 @@ class AmongBodiesNumbers(NamedTuple):
         clearance: The distance that is kept, in [m].
         influence: The distance from which on a pair is looked at, in [m].
         repulsion: How strongly the joints are led away from what is near, in [1/s].
-        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 

@@ -64,7 +64,7 @@ class AmongBodiesNumbers(NamedTuple):
         gain, tolerance, full_rank, damping, secondary_gain, joint_gain, goal: See :class:`NullSpaceNumbers`.
         influence: The distance from which on a pair is looked at, in [m].
         repulsion: K of the way out, in [1/s].
-        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 

@@ -58,7 +58,7 @@ class PlanNumbersAmong(NamedTuple):
         prismatic, numbers, integers: See :class:`PlanNumbers`.
         clearance: The distance that is kept at the knots, in [m].
         sweep: See :class:`bodies.Clearance`. Shape (k, n).
-        bodies: See :class:`baselines.solvers.near_bodies.Around`.
+        bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 
