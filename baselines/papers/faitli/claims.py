@@ -35,6 +35,7 @@ def _largest_error(episode: Episode) -> float:
 
 
 def accurate_tracking(runs: Runs) -> Finding:
+    """Largest error as a share of the path's extent."""
     shares = {
         short(name): _largest_error(solved(runs, name)) / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES
     }
@@ -42,6 +43,7 @@ def accurate_tracking(runs: Runs) -> Finding:
 
 
 def accurate_in_singularities(runs: Runs) -> Finding:
+    """Largest error in the quarter of the path with the smallest singular values, as a share of the extent."""
     shares: dict[str, float] = {}
     for name in (STRETCHED, SHOULDER):
         scenario, error = runs.scenario(name), solved(runs, name).position_error
@@ -58,12 +60,14 @@ def _separation(runs: Runs, name: str, episode: Episode) -> FloatArray:
 
 
 def other_joint_coordinates(runs: Runs) -> Finding:
+    """Largest distance of the joint paths."""
     apart = float(_separation(runs, STRETCHED, solved(runs)).max())
     nominal = nominal_joints(runs.scenario(STRETCHED))
     return Finding(apart > 0.1 * np.ptp(nominal, axis=0).max(), {"[rad]": apart})
 
 
 def separation_at_singularities(runs: Runs) -> Finding:
+    """Time between a singular point and the separation of the joint paths."""
     scenario = runs.scenario(STRETCHED)
     time, nominal = times(scenario), nominal_joints(scenario)
     regular = float(_separation(runs, REGULAR, solved(runs, REGULAR)).max())
@@ -76,6 +80,7 @@ def separation_at_singularities(runs: Runs) -> Finding:
 
 
 def zero_eigenvalues(runs: Runs) -> Finding:
+    """Singular points passed: sign changes of det J along the calculated joint path, then along the nominal one."""
     counts: dict[str, list[float]] = {}
     for name in TRAJECTORIES:
         scenario = runs.scenario(name)
@@ -85,6 +90,7 @@ def zero_eigenvalues(runs: Runs) -> Finding:
 
 
 def real_part_zero_is_singular(runs: Runs) -> Finding:
+    """Zeros of a real part at which J is regular: a conjugate pair of eigenvalues crosses the imaginary axis there."""
     regular: dict[str, float] = {}
     for name in TRAJECTORIES:
         jacobian = jacobians(runs.scenario(name), solved(runs, name).q)
@@ -94,6 +100,7 @@ def real_part_zero_is_singular(runs: Runs) -> Finding:
 
 
 def end_point_of_link_2(runs: Runs) -> Finding:
+    """Largest distance of the joint paths, without and with the end point: A = -1, and A sure to contract."""
     figures = {}
     sure = make("fixed_point_extended", runs.scenario(STRETCHED)).parameters["a"]
     for name in TRAJECTORIES:
@@ -104,12 +111,14 @@ def end_point_of_link_2(runs: Runs) -> Finding:
 
 
 def d_is_a_parameter(runs: Runs) -> Finding:
+    """Joint paths with other values of D, which differ by rounding."""
     paths = [solved(runs, d=d).q for d in (0.3, 0.0, -2.0, 5.0)]
     apart = max(float(np.abs(q - paths[0]).max()) for q in paths[1:])
     return Finding(apart > 1e-4, {"[rad]": apart})
 
 
 def a_decides_convergence(runs: Runs) -> Finding:
+    """Largest error with values of A within and beyond the bound."""
     scenario = runs.scenario(REGULAR)
     bound = 4.0 / float(singular_values(jacobians(scenario, nominal_joints(scenario))).max() ** 2)
     errors = {a: _largest_error(solved(runs, REGULAR, a=a)) for a in (0.1, -0.1, -1.0, -2.0, -3.0)}
@@ -120,6 +129,7 @@ def a_decides_convergence(runs: Runs) -> Finding:
 
 
 def transpose_helps_convergence(runs: Runs) -> Finding:
+    """Largest error with Jᵀ, and without it with the best A."""
     figures = {}
     for name in TRAJECTORIES:
         without = [solved(runs, name, transformation="none", a=a) for a in (-1.0, -0.1, 0.1, 1.0)]
@@ -147,6 +157,7 @@ def not_square(runs: Runs) -> Finding:
 
 
 def several_iterations(runs: Runs) -> Finding:
+    """Error with 1, 10 and 100 iterations a grid point."""
     figures = {
         short(name): [rms(solved(runs, name, iterations=n).position_error) for n in (1, 10, 100)]
         for name in TRAJECTORIES
@@ -155,12 +166,14 @@ def several_iterations(runs: Runs) -> Finding:
 
 
 def no_inversion(runs: Runs) -> Finding:
+    """Counted by hand in eq. 1: each iteration takes one Jacobian and multiplies by its transpose."""
     jacobians_of_a_step = int(make("fixed_point", runs.scenario(STRETCHED)).parameters["iterations"])
     factorisations = 0
     return Finding(factorisations == 0, {"factorisations": factorisations, "Jacobians a step": jacobians_of_a_step})
 
 
 def no_yanks(runs: Runs) -> Finding:
+    """Peak joint velocity over the median of the fastest joint's, where inversion yanks."""
     multiples = {}
     for scenario in singular_places(runs):
         inversion, method = runs.play(scenario, "moore_penrose"), solved(runs, scenario)
@@ -170,5 +183,6 @@ def no_yanks(runs: Runs) -> Finding:
 
 
 def easy_to_set(runs: Runs) -> Finding:
+    """A judgement."""
     del runs
     return Finding(None, {})

@@ -43,6 +43,7 @@ def _before_and_after(before: Errors, after: Errors) -> Figures:
 
 
 def level_path(runs: Runs) -> Finding:
+    """Variation of the height, and lean of the axis of rotation, along the nominal path."""
     nominal = runs.scenario(Q1).nominal()
     height, lean = float(np.ptp(nominal[:, 11])), float(np.abs(turned(nominal)[:, :2]).max())
     return Finding(height < 1e-12 and lean < 1e-12, {"X₃ [m]": height, "lean [rad]": lean})
@@ -55,6 +56,7 @@ def _steps_until(errors: FloatArray, level: float) -> float:
 
 
 def initial_position_error_relaxes(runs: Runs) -> Finding:
+    """Inner steps to a tenth of the initial position error."""
     scenario, episode = runs.scenario(Q1), runs.play(Q1, METHOD)
     first = scenario.nominal()[0, 9:] - scenario.arm.forward(np.zeros(scenario.joints))[1]
     initial = float(np.linalg.norm(first))
@@ -64,12 +66,14 @@ def initial_position_error_relaxes(runs: Runs) -> Finding:
 
 
 def small_orientation_error(runs: Runs) -> Finding:
+    """Orientation errors on both paths."""
     settled = [errors(runs, path) for path in PATHS.values()]
     figures = {"RMS [rad]": [e.angle for e in settled], "largest [rad]": [e.largest_angle for e in settled]}
     return Finding(None, figures)
 
 
 def sixty_inner_steps(runs: Runs) -> Finding:
+    """Position errors at points 10 and 100, with 60 and with 10 inner steps at the first points."""
     scenario = runs.scenario(Q1)
     few = at_points(runs, scenario.replace(iterations_per_point=(10,), steps=min(scenario.steps, 1000)))
     many = at_points(runs, Q1)
@@ -79,16 +83,19 @@ def sixty_inner_steps(runs: Runs) -> Finding:
 
 
 def f_weights_orientation_down(runs: Runs) -> Finding:
+    """Orientation error without and with ℱ."""
     before, after = _weighted(runs, Q1, LOOSE)
     return Finding(larger(after.angle, before.angle), _before_and_after(before, after))
 
 
 def f_couples(runs: Runs) -> Finding:
+    """Position error without and with ℱ."""
     before, after = _weighted(runs, Q1, LOOSE)
     return Finding(differ(after.position, before.position), {"[mm]": (1e3 * before.position, 1e3 * after.position)})
 
 
 def subtle_differences(runs: Runs) -> Finding:
+    """Distance of the joint coordinates without and with ℱ."""
     apart = np.abs(at_points(runs, Q1).q - at_points(runs, Q1, **LOOSE).q).max(axis=0)
     motion = float(np.ptp(at_points(runs, Q1).q, axis=0).max())
     return Finding(None, {"[rad]": float(apart.max()), "of [rad]": motion})
@@ -101,10 +108,12 @@ def _blocked(runs: Runs, name: str) -> Finding:
 
 
 def w_blocks_joints(runs: Runs) -> Finding:
+    """On the path by joint 1."""
     return _blocked(runs, Q1)
 
 
 def w_keeps_precision(runs: Runs) -> Finding:
+    """Beside the run without 𝒲, and beside the path's extent."""
     before, after = _weighted(runs, Q1, BLOCKED)
     share = after.largest_position / extent(runs.scenario(Q1).nominal()[:, 9:])
     holds = {"beside the run without W": not after.worse(before), "beside the extent": share < SAME}
@@ -112,6 +121,7 @@ def w_keeps_precision(runs: Runs) -> Finding:
 
 
 def general_path(runs: Runs) -> Finding:
+    """Ranges of the nominal coordinates, and whether the axis of the rotation from home changes."""
     nominal = runs.scenario(Q7Q8).nominal()
     ranges, vectors = np.ptp(nominal[:, 9:], axis=0), turned(nominal)
     rank = np.linalg.svd(vectors, compute_uv=False)
@@ -121,6 +131,7 @@ def general_path(runs: Runs) -> Finding:
 
 
 def acceptable_solutions(runs: Runs) -> Finding:
+    """Errors on the path by joints 7 and 8."""
     settled = errors(runs, Q7Q8)
     figures = {
         "RMS [mm]": 1e3 * settled.position,
@@ -131,16 +142,19 @@ def acceptable_solutions(runs: Runs) -> Finding:
 
 
 def w_degrades_q7_and_q8(runs: Runs) -> Finding:
+    """Errors without and with 𝒲."""
     before, after = _weighted(runs, Q7Q8, BLOCKED)
     holds = larger(after.position, before.position) and larger(after.angle, before.angle)
     return Finding(holds, _before_and_after(before, after))
 
 
 def w_reduces_q7_and_q8(runs: Runs) -> Finding:
+    """On the path by joints 7 and 8."""
     return _blocked(runs, Q7Q8)
 
 
 def stable_and_convergent(runs: Runs) -> Finding:
+    """On the path the error must not grow; with the target held, it must go on falling."""
     points, scenario = at_points(runs, Q7Q8, **BLOCKED), runs.scenario(Q7Q8)
     held = runs.play(scenario.replace(iterations_per_point=(scenario.steps,)), METHOD, **BLOCKED)
     at = [min(k, scenario.steps) - 1 for k in (1_000, 10_000, 100_000)]
@@ -152,6 +166,7 @@ def stable_and_convergent(runs: Runs) -> Finding:
 
 
 def smallest_eigenvalue(runs: Runs) -> Finding:
+    """Smallest real parts along the path."""
     least = spectra(runs, Q7Q8, **BLOCKED)[:, 0]
     size = float(np.median(np.abs(least)))
     holds = 1e-15 < size < 1e-13 and bool(least.min() < 0.0 < least.max())
@@ -159,11 +174,13 @@ def smallest_eigenvalue(runs: Runs) -> Finding:
 
 
 def largest_eigenvalue(runs: Runs) -> Finding:
+    """Largest real parts along the path."""
     most = spectra(runs, Q7Q8, **BLOCKED)[:, -1]
     return Finding(None, {"[m²]": [float(most.min()), float(most.max())]})
 
 
 def delicate_by_the_zero(runs: Runs) -> Finding:
+    """Eigenvalues that vanish at every point say nothing of the path: rank 6 of 8 leaves two of them."""
     real = np.concatenate([spectra(runs, Q1), spectra(runs, Q7Q8, **BLOCKED)])
     vanishing = (np.abs(real) < 1e-9).sum(axis=1)
     slowest = 1.0 / (5e-4 * real[:, 2].min())
@@ -177,25 +194,30 @@ TASK: Variant = {"counter_rotation": "task"}
 
 
 def counter_rotation(runs: Runs) -> Finding:
+    """Whether anything gets worse without 𝒩, in either reading and with either iteration."""
     figures = errors_of_variants(runs, {}, TASK, NONE, CONTRACTION, {**CONTRACTION, **NONE})
     pairs = {"8×8": (NONE, {}), "12×12": (NONE, TASK), "eq. 2.9": ({**CONTRACTION, **NONE}, CONTRACTION)}
     return Finding({name: not no_worse(runs, *pair) for name, pair in pairs.items()}, figures)
 
 
 def twelve_dimensions(runs: Runs) -> Finding:
+    """Errors with 𝒩 in the task's 12 dimensions and in joint space."""
     return Finding(None, errors_of_variants(runs, TASK, {}))
 
 
 def dinevas_iteration(runs: Runs) -> Finding:
+    """Errors with eq. 2.9 and with eq. 3.16."""
     return Finding(no_worse(runs, CONTRACTION, {}), errors_of_variants(runs, CONTRACTION, {}))
 
 
 def j_prev_a(runs: Runs) -> Finding:
+    """Errors with J̃ held during a point, and with J̃ of each inner step."""
     held: Variant = {"jacobian": "point"}
     return Finding(no_worse(runs, held, {}), errors_of_variants(runs, held, {}))
 
 
 def no_inversion(runs: Runs) -> Finding:
+    """Counted by hand in eq. 3.16 and the listing of AdaptiveDeform: products and norms only."""
     del runs
     factorisations = 0
     return Finding(factorisations == 0, {"factorisations": factorisations, "Jacobians": 1, "measured poses": 1})

@@ -92,6 +92,7 @@ def distortions(runs: Runs) -> FloatArray:
 
 
 def stagnation(runs: Runs) -> Finding:
+    """Mean speed of the joint that inversion moves fastest, in the steps in which inversion yanks."""
     figures = {}
     for scenario in singular_places(runs):
         method, inversion = (np.abs(runs.play(scenario, p).qdot) for p in ("fixed_point", "moore_penrose"))
@@ -105,12 +106,14 @@ def stagnation(runs: Runs) -> Finding:
 
 
 def damping_distorts(runs: Runs) -> Finding:
+    """Errors away from singular points."""
     policies = ("moore_penrose", "dls", "fixed_point")
     errors = {policy: rms(runs.play(TRAJECTORIES[1], policy).position_error) for policy in policies}
     return Finding(errors["dls"] > errors["moore_penrose"], scaled(errors, "µm"))
 
 
 def distortion(runs: Runs) -> Finding:
+    """Exponents of μ and λ_min in the relative distortion of the nominal velocities."""
     mu, least, relative = distortions(runs)
     design = np.stack([np.ones_like(mu), np.log(mu), np.log(least)], axis=1)
     _, of_mu, of_least = np.linalg.lstsq(design, np.log(relative), rcond=None)[0]
@@ -119,11 +122,13 @@ def distortion(runs: Runs) -> Finding:
 
 
 def two_joints(runs: Runs) -> Finding:
+    """Share of all configurations with the real parts of both eigenvalues of one sign."""
     positive, negative = planar_signs(runs)
     return Finding(max(positive, negative) < 1.0, scaled({"positive": positive, "negative": negative}, "%"))
 
 
 def sign_works_for_two_joints(runs: Runs) -> Finding:
+    """The best run over A of both readings of σ, and without σ, on two paths of the planar arm."""
     bent = {t: best(runs, runs.scenario(PLANAR), t) for t in (*SIGNS, "none")}
     wide = {t: best(runs, turning(runs), t) for t in (*SIGNS, "none")}
     figures: dict[str, Any] = {"bent [mm]": [1e3 * one.error for one in bent.values()]}
@@ -132,6 +137,7 @@ def sign_works_for_two_joints(runs: Runs) -> Finding:
 
 
 def sign_variant(runs: Runs) -> Finding:
+    """The best run over A of both readings of σ, with 3 joints."""
     holds, figures = {}, {}
     for scenario in (*map(runs.scenario, TRAJECTORIES), one_sign(runs)):
         tried = [best(runs, scenario, t) for t in SIGNS]

@@ -45,14 +45,17 @@ def _compensates(runs: Runs, error: str, unit: str) -> Finding:
 
 
 def compensates_position(runs: Runs) -> Finding:
+    """Position errors."""
     return _compensates(runs, "position", "mm")
 
 
 def compensates_orientation(runs: Runs) -> Finding:
+    """Orientation errors."""
     return _compensates(runs, "angle", "rad")
 
 
 def precise_model(runs: Runs) -> Finding:
+    """Errors with an exact model beside those with the approximate one."""
     figures: dict[str, Any] = {}
     holds = True
     for name, path in PATHS.items():
@@ -72,6 +75,7 @@ def _probing(qdot: FloatArray) -> float:
 
 
 def no_exploration(runs: Runs) -> Finding:
+    """Steps in which one joint moves alone, as the investigation of each direction would take."""
     shares = {name: _probing(runs.play(Q7Q8, name).qdot) for name in (METHOD, *CLOSED_LOOPS)}
     holds = {
         "the method": shares[METHOD] == 0.0,
@@ -81,11 +85,13 @@ def no_exploration(runs: Runs) -> Finding:
 
 
 def less_hectic(runs: Runs) -> Finding:
+    """Peak joint velocities and travel beside two closed loops."""
     peaks = {name: float(np.abs(runs.play(Q7Q8, name).qdot).max()) for name in (METHOD, *CLOSED_LOOPS)}
     return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"))
 
 
 def compensates_manufacturing(runs: Runs) -> Finding:
+    """As the claims on compensation, with arms that differ from the model by errors of several sizes."""
     path, holds, figures = three_seconds(runs), {}, {}
     for size in DEVIATIONS:
         arms = manufactured_arms(path, size)
@@ -99,6 +105,7 @@ def compensates_manufacturing(runs: Runs) -> Finding:
 
 
 def needs_precise_measurement(runs: Runs) -> Finding:
+    """Whether an error grows with noise in the measured pose."""
     path, figures = three_seconds(runs), {}
     holds: dict[str, bool] = {}
     plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))

@@ -52,16 +52,19 @@ def _by_arm(shares: dict[str, float]) -> Figures:
 
 
 def printed_step(runs: Runs) -> Finding:
+    """Share of the steps that diverge with the printed bounds of α, in all readings."""
     shares = {label: diverged(episode) for label, episode in _all_readings(runs).items()}
     return Finding({label: share == 0.0 for label, share in shares.items()}, _by_arm(shares))
 
 
 def limit_reached(runs: Runs) -> Finding:
+    """Share of the steps with all 450 iterations, in all readings."""
     shares = {label: at_limit(episode) for label, episode in _all_readings(runs).items()}
     return Finding(above(shares, 0.5), _by_arm(shares))
 
 
 def offline_only(runs: Runs) -> Finding:
+    """Processor time of a step with the stop test, with all iterations, and interpreted."""
     descents: dict[str, dict[str, Any]] = {
         "with the stop test": {},
         "450 iterations": {"tolerance": 0.0},
@@ -85,12 +88,14 @@ def _interpreted(runs: Runs, iterations: int = 15) -> float:
 
 
 def time_proportional(runs: Runs) -> Finding:
+    """Time per iteration in steps of 50 to 450 iterations."""
     numbers = (50, 150, 250, 350, 450)
     times = [time_of_step(runs, tolerance=0.0, iterations=number) / number for number in numbers]
     return Finding(not larger(max(times), min(times)), scaled({"": times}, "µs"))
 
 
 def multipliers_cost_more(runs: Runs) -> Finding:
+    """Time of `rhc_lagrange` over that of `rhc_gradient`, with the same gradients."""
     ratios = {}
     for gradient in ("finite_difference", "analytic"):
         plain = runs.play(FAST, METHOD, gradient=gradient)
@@ -102,6 +107,7 @@ def multipliers_cost_more(runs: Runs) -> Finding:
 
 
 def acceptable_precision(runs: Runs) -> Finding:
+    """Largest errors on the fast path."""
     episode = fast(runs)
     largest = float(episode.position_error.max())
     extent = float(np.ptp(runs.scenario(FAST).nominal()[:, 3:], axis=0).max())
@@ -114,11 +120,13 @@ def _largest_error(episode: Episode) -> float:
 
 
 def slow_is_finer(runs: Runs) -> Finding:
+    """Largest position errors on the fast and the slow path."""
     a, b = _largest_error(fast(runs)), _largest_error(slow(runs))
     return Finding(larger(a, b), scaled({"fast": a, "slow": b}, "mm"))
 
 
 def fast_fluctuates(runs: Runs) -> Finding:
+    """Largest change of a velocity in one step over the peak."""
     jumps = {name: largest_jump(runs.play(FAST, METHOD, **alpha).qdot) for name, alpha in ALPHAS.items()}
     return Finding(above(jumps, 0.1), scaled(jumps, "%"))
 
@@ -135,6 +143,7 @@ def _fluctuations(qdot: FloatArray) -> dict[str, float]:
 
 
 def slow_fluctuates(runs: Runs) -> Finding:
+    """Second differences on the fast and the slow path, in three measures."""
     holds: dict[str, bool] = {}
     figures: dict[str, list[float]] = {}
     for name, alpha in ALPHAS.items():
@@ -146,16 +155,19 @@ def slow_fluctuates(runs: Runs) -> Finding:
 
 
 def other_joint_paths(runs: Runs) -> Finding:
+    """Largest distance of a joint coordinate from its nominal one."""
     apart = float(np.abs(fast(runs).q - nominal_path(runs, FAST)[1:]).max())
     return Finding(apart > 0.05, {"[rad or m]": apart})
 
 
 def velocities_bounded(runs: Runs) -> Finding:
+    """Peak joint velocities of the method and of the pseudoinverse."""
     method, other = (float(np.abs(e.qdot).max()) for e in (fast(runs), runs.play(FAST, "moore_penrose")))
     return Finding(larger(other, method), {"method [rad/s]": method, "pseudoinverse [rad/s]": other})
 
 
 def smoothing_calms(runs: Runs) -> Finding:
+    """Fluctuation before and after smoothing, by second differences and by total variation."""
     kept = runs.play(FAST, METHOD, **KEPT), runs.play(FAST, "smoothed", policy=METHOD, options=KEPT)
     holds: dict[str, bool] = {}
     figures: dict[str, list[float]] = {}
@@ -168,11 +180,13 @@ def smoothing_calms(runs: Runs) -> Finding:
 
 
 def smoothing_errs(runs: Runs) -> Finding:
+    """Largest position errors before and after smoothing."""
     a, b = _largest_error(fast(runs)), _largest_error(smooth(runs))
     return Finding(larger(b, a, CONSIDERABLY), scaled({"before": a, "after": b}, "mm"))
 
 
 def skew_part_determines(runs: Runs) -> Finding:
+    """Share of the nominal paths beyond 90°: the skew part is sin θ times the axis, the same for θ and π − θ."""
     angles = {name: nominal_angles(runs, path) for name, path in (("fast", FAST), ("slow", SLOW))}
     shares = {name: float((angle > 0.5 * np.pi).mean()) for name, angle in angles.items()}
     return Finding(max(shares.values()) == 0.0, scaled(shares, "%"))

@@ -35,6 +35,7 @@ from ikgym.scenarios import Scenario
 
 
 def poles(runs: Runs) -> Finding:
+    """Largest eigenvalue of (9), and of (29) for n = 5, with the Jacobians along example 1."""
     episode = predictive(runs)
     jacobians = jacobians_used(runs.scenario(HELIX), episode)[settled_from(episode) :]
     transposed = jacobians.transpose(0, 2, 1)
@@ -50,16 +51,19 @@ def poles(runs: Runs) -> Finding:
 
 
 def error_grows_with_lambda(runs: Runs) -> Finding:
+    """Largest error after the transient with constant λ."""
     errors = [settled_error(constant(runs, HELIX, damping)) for damping in (0.0, 0.2, 2.0, 20.0, 200.0)]
     return Finding(bool((np.diff(errors) > 0.0).all()), {"[m]": errors})
 
 
 def large_lambda(runs: Runs) -> Finding:
+    """Error at the last sample with λ = 2 and 200 m²."""
     small, large = (float(constant(runs, HELIX, damping).position_error[-1]) for damping in (2.0, 200.0))
     return Finding(large > small, {"[m]": (small, large)})
 
 
 def static_error(runs: Runs) -> Finding:
+    """Distance of the error on a ramp from eq. 10, as a share."""
     apart: dict[str, float] = {}
     for damping in (0.2, 2.0, 20.0):
         error, formula = ramp_errors(runs, 1e-3, damping)
@@ -68,6 +72,7 @@ def static_error(runs: Runs) -> Finding:
 
 
 def no_static_error(runs: Runs) -> Finding:
+    """Order of the error in the velocity; the curvature of the kinematics leaves an error of the second order."""
     orders: dict[str, float] = {}
     for name, horizon in (("MFAC", 1), ("MFAPC", 5)):
         fast, slow = (float(np.linalg.norm(ramp_errors(runs, v, 0.0, horizon)[0])) for v in (1e-2, 1e-3))
@@ -86,6 +91,7 @@ def _falls_with_lambda(values: Mapping[str, list[float]], unit: str, peaks: Mapp
 
 
 def robustness(runs: Runs) -> Finding:
+    """Targets lost with a wrong model, and peak joint velocities near singular points, by λ."""
 
     def lost(share: float, links: float) -> float:
         return float((at_rest(runs, share, 0.1, links=links)[0][-1] >= SAME).mean())
@@ -100,6 +106,7 @@ def robustness(runs: Runs) -> Finding:
 
 
 def fastest_without_damping(runs: Runs) -> Finding:
+    """Samples until the error stays below 1 %, by λ, and overshoot of λ = 0, for three distances."""
     holds: dict[str, bool] = {}
     figures: dict[str, float | list[float]] = {}
     undamped: list[float] = []
@@ -118,6 +125,7 @@ def fastest_without_damping(runs: Runs) -> Finding:
 
 
 def robustness_on_plants(runs: Runs) -> Finding:
+    """Largest error in a loop with a delay, peak joint velocity with noise, by λ."""
     errors: dict[str, list[float]] = {}
     peaks: dict[str, list[float]] = {}
     plants = {
@@ -137,6 +145,7 @@ def robustness_on_plants(runs: Runs) -> Finding:
 
 
 def model_free(runs: Runs) -> Finding:
+    """Error with the exact model and on the worst of three arms for each calibration, by example and controller."""
     calibrations = {"fine": (5e-4, 3e-4), "coarse": (1e-2, 1e-2)}
     controllers: dict[str, dict[str, Any]] = {
         "(5)": {"one_step": True, "rule": "constant", "damping": 0.0},
@@ -164,6 +173,7 @@ def model_free(runs: Runs) -> Finding:
 
 
 def levenberg_marquardt(runs: Runs) -> Finding:
+    """Largest distance of ten iterates from those of the normal equations."""
     apart = {}
     for name in TARGETS:
         targets = drawn(runs, name)
@@ -184,11 +194,13 @@ def _correlations(runs: Runs, name: str) -> tuple[float, float]:
 
 
 def error_and_change_of_j(runs: Runs) -> Finding:
+    """Rank correlation from iteration to iteration."""
     found = {name: _correlations(runs, name)[0] for name in TARGETS}
     return Finding(min(found.values()) > 0.1, found)
 
 
 def error_and_condition(runs: Runs) -> Finding:
+    """Rank correlation from iteration to iteration, and along four paths."""
     found = {name: _correlations(runs, name)[1] for name in TARGETS}
     for name in (HELIX, LINE, *SINGULAR):
         scenario, episode = runs.scenario(name), constant(runs, name, of_link(runs, name, 1e-3))
@@ -224,6 +236,7 @@ def rule_14(runs: Runs) -> Finding:
 
 
 def rule_18(runs: Runs) -> Finding:
+    """Targets met with λ = 0 and three choices of a₁ and a₂: of (44), with faster decay, the default of (14)."""
     rules = {
         f"{a}, {b}": {"rule": "threshold", "growth": a, "decay": b, "damping": 1e-3}
         for a, b in ((1.1, 1.02), (1.1, 1.2), (2.0, 2.0))
@@ -232,6 +245,7 @@ def rule_18(runs: Runs) -> Finding:
 
 
 def look_up(runs: Runs) -> Finding:
+    """Targets met with λ = 0, with Table I and with (37), each also with milder values."""
     milder = ((0.0, 0.0, 0.0), (1e-8, 1e-6, 1e-4), (1e-6, 1e-4, 1e-3))
     rules: dict[str, dict[str, Any]] = {
         "Table I": {"rule": "table"},
@@ -243,6 +257,7 @@ def look_up(runs: Runs) -> Finding:
 
 
 def constant_lambda(runs: Runs) -> Finding:
+    """Mean iterations with three constant λ; the line of example 2 stays away from singular points."""
     episodes = [runs.play(LINE, "mfac", rule="constant", damping=damping) for damping in (0.0, 1e-4, 1e-3)]
     means = [float(episode.iterations.mean()) for episode in episodes]
     shares = [float((episode.status == Status.CONVERGED).mean()) for episode in episodes]

@@ -31,6 +31,7 @@ Pairs = dict[str, tuple[float, float]]
 
 
 def one_formula(runs: Runs) -> Finding:
+    """Distance of the sums of three steps, with the same J and y* all along, which is the kindest case."""
     jacobian = jacobians_used(runs.scenario(HELIX), predictive(runs))[-1]
     error, n, apart = np.ones(3), 3, {}
     whole = np.kron(np.tril(np.ones((n, n))), jacobian)
@@ -46,12 +47,14 @@ def one_formula(runs: Runs) -> Finding:
 
 
 def one_point(runs: Runs) -> Finding:
+    """Largest difference of an input with n = 1."""
     one = along_the_helix(runs, "mfac", 1, damping=2.0)
     worst = float(np.abs(one - along_the_helix(runs, "mfapc", 1, horizon=1, damping=2.0)).max())
     return Finding(worst < 1e-12, {"[rad]": worst})
 
 
 def undamped(runs: Runs) -> Finding:
+    """Largest difference of an input with λ = 0."""
     one = along_the_helix(runs, "mfac", 1, damping=0.0)
     others = (along_the_helix(runs, "mfapc", n, horizon=n, damping=0.0) for n in (2, 3, 5))
     apart = [float(np.abs(one - other).max()) for other in others]
@@ -59,6 +62,7 @@ def undamped(runs: Runs) -> Finding:
 
 
 def held_points(runs: Runs) -> Finding:
+    """Distance of the inputs with n = 5 and the first point repeated, as a share, the median over the states."""
     apart = {}
     for damping in (0.0, 0.2, 2.0, 20.0):
         one = along_the_helix(runs, "mfac", 1, damping=damping)
@@ -69,6 +73,7 @@ def held_points(runs: Runs) -> Finding:
 
 
 def closer_tracking(runs: Runs) -> Finding:
+    """Largest error after the transient with MFAC and with MFAPC."""
     pairs = {
         "(44)": (settled_error(adaptive(runs)), settled_error(predictive(runs))),
         "λ = 2": (settled_error(constant(runs, HELIX, 2.0)), settled_error(constant(runs, HELIX, 2.0, 5))),
@@ -109,14 +114,17 @@ def _smoothness(runs: Runs, values: Callable[[Episode], FloatArray]) -> Finding:
 
 
 def smoother_inputs(runs: Runs) -> Finding:
+    """Roughness of the joint coordinates."""
     return _smoothness(runs, lambda episode: episode.q)
 
 
 def smoother_outputs(runs: Runs) -> Finding:
+    """Roughness of the task coordinates."""
     return _smoothness(runs, lambda episode: episode.pose)
 
 
 def singular_points(runs: Runs) -> Finding:
+    """Closeness to singular points, and time near them."""
 
     def sigma(path: str, episode: Episode) -> FloatArray:
         return np.asarray(np.linalg.svd(runs.scenario(path).arm.jacobian(episode.q)[:, :3], compute_uv=False)[:, -1])

@@ -28,12 +28,14 @@ from ikgym.validation import FloatArray
 
 
 def switch_at_33(runs: Runs) -> Finding:
+    """Sample of the largest λ."""
     lambdas = lambdas_used(predictive(runs))
     turn = int(lambdas.argmax()) + 1
     return Finding(turn == 33, {"k =": turn, "λ [m²]": float(lambdas.max())})
 
 
 def up_then_down(runs: Runs) -> Finding:
+    """Samples with rising and with falling λ."""
     change = np.diff(lambdas_used(predictive(runs)))
     turns = int((np.diff(np.sign(change)) != 0.0).sum())
     figures = {"up": int((change > 0.0).sum()), "down": int((change < 0.0).sum()), "turns": turns}
@@ -41,18 +43,21 @@ def up_then_down(runs: Runs) -> Finding:
 
 
 def poor_start(runs: Runs) -> Finding:
+    """Largest errors in the first 8 samples and after the transient."""
     error = predictive(runs).position_error
     first, later = float(error[: min(8, len(error) // 2)].max()), settled_error(predictive(runs))
     return Finding(first > later, {"start [m]": first, "later [m]": later})
 
 
 def falling_lambda(runs: Runs) -> Finding:
+    """Largest error after the transient with λ held at its peak, and falling."""
     peak = float(lambdas_used(predictive(runs)).max())
     held, free = settled_error(constant(runs, HELIX, round(peak, 4), 5)), settled_error(predictive(runs))
     return Finding(larger(held, free), scaled({"held": held, "falling": free}, "mm"))
 
 
 def excellent(runs: Runs) -> Finding:
+    """Largest errors as shares of the path's extent and, on the line, of the whole turn."""
     line, nominal = iterative(runs), runs.scenario(LINE).nominal()
     ways = runs.scenario(LINE).task.error(nominal[-1], nominal[0])
     shares = {
@@ -64,12 +69,14 @@ def excellent(runs: Runs) -> Finding:
 
 
 def ten_iterations(runs: Runs) -> Finding:
+    """Points met, and the most iterations of a period."""
     episode = iterative(runs, stop="first_point")
     share, most = float((episode.status == Status.CONVERGED).mean()), int(episode.iterations.max())
     return Finding(share == 1.0 and most <= 10, {"met [%]": 100.0 * share, "iterations": most})
 
 
 def whole_horizon(runs: Runs) -> Finding:
+    """Samples at which (40) is unmet after 10 and 100 iterations, and the error that is left."""
     unmet = [float((iterative(runs, iterations=n).status == Status.ITERATION_LIMIT).mean()) for n in (10, 100)]
     left = unmet_of_the_way(runs)
     figures = scaled({"unmet": unmet, "left": left}, "%")
@@ -85,6 +92,7 @@ def _printed_vector(d: FloatArray) -> FloatArray:
 
 
 def printed_angle(runs: Runs) -> Finding:
+    """Relative error of the product of two rotations about one axis as in (51)-(54); 1 where there is no number."""
     del runs
     axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     printed: dict[str, float] = {}
@@ -121,6 +129,7 @@ def _median_micros(call: Callable[[], object], times: int) -> float:
 
 
 def inverse_of_18(runs: Runs) -> Finding:
+    """Times of the inverse of Ψ̄ᵀ Ψ̄ + λ̄ for n = 3 at the start of example 2, compiled and interpreted."""
     scenario, iterations = runs.scenario(LINE), 10
     start = np.zeros(6) if scenario.start is None else scenario.start
     whole = np.kron(np.tril(np.ones((3, 3))), scenario.model.jacobian(start))
@@ -146,5 +155,6 @@ def _ten_iterations(runs: Runs, horizon: int, damping: float) -> Episode:
 
 
 def less_calculation(runs: Runs) -> Finding:
+    """Times of 10 iterations with n = 3 and λ > 0, and with n = 2 and λ = 0."""
     a, b = (1e-3 * float(np.median(_ten_iterations(runs, n, d).time_ns)) for n, d in ((3, 1e-3), (2, 0.0)))
     return Finding(larger(a, b), {"n = 3: [µs]": a, "n = 2: [µs]": b})
