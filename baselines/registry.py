@@ -145,7 +145,7 @@ def resolve(import_path: str) -> type[SolverPolicy]:
 
 
 def load(import_path: str) -> object:
-    """Whatever is at an import path ``"package.module:attribute"``.
+    """The object at an import path ``"package.module:attribute"``.
 
     Raises:
         InvalidInputError: It has another form, or cannot be imported.

@@ -163,8 +163,8 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
-_MADE = (arms, tasks, scenarios, paths, problems, splits, policies, statuses, test_sets, records)
-TABLES = {**{make.__name__: make for make in _MADE}, "loop": loop.table}
+_FROM_CODE = (arms, tasks, scenarios, paths, problems, splits, policies, statuses, test_sets, records)
+TABLES = {**{make.__name__: make for make in _FROM_CODE}, "loop": loop.table}
 
 
 def markdown(rows: Iterable[tuple[str, ...]]) -> str:

@@ -67,7 +67,7 @@ def policy_for(
 ) -> SolverPolicy:
     """A policy for an arm with such drives: ``predicted`` around it, unless the drives are perfect.
 
-    What predicts knows the acceleration limits of the guards where the model has none, so that nothing jumps. A policy
+    The prediction knows the acceleration limits of the guards where the model has none, so that nothing jumps. A policy
     that has ``predicted`` in it is not wrapped again. The arguments are those of :class:`Controller`.
 
     Raises:

@@ -59,7 +59,7 @@ def find_all(
 ) -> Iterator[tuple[Wanted, Optimum]]:
     """The cheapest paths that are found; by workers in the order in which they are done.
 
-    What workers of a cluster find is played again here, and kept on the disk of this machine as well. ``tick`` is
+    Paths found by workers of a cluster are played again here, and kept on the disk of this machine as well. ``tick`` is
     called now and then with an episode and the share of its work done since the last call.
 
     Raises:
