@@ -160,12 +160,11 @@ def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
 
 def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
     """Points of the arm that moves, which may differ from its data sheet, after numbers of steps."""
-    plant = scenario.drawn_plant(seeds.seed, seeds.arm_seed)
-    arms = [plant.loaded_arm if steps >= plant.payload_step else plant.arm for steps in after]
-    places = [arm.forward(row) for arm, row in zip(arms, q, strict=True)]
-    points = np.array([arm.joint_points(row) for arm, row in zip(arms, q, strict=True)])
-    return {
-        "joint_points": points.astype(np.float32),
-        "tool": np.array([position for _, position in places], dtype=np.float32),
-        "tool_rotation": np.array([rotation for rotation, _ in places], dtype=np.float32),
-    }
+    plant, n = scenario.drawn_plant(seeds.seed, seeds.arm_seed), scenario.joints
+    loaded = after >= plant.payload_step
+    points, tool, rotation = np.empty((len(q), n, 2, 3)), np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    for rows, arm in ((~loaded, plant.arm), (loaded, plant.loaded_arm)):
+        points[rows] = arm.joint_points(q[rows])
+        rotation[rows], tool[rows] = arm.forward(q[rows])
+    arrays = {"joint_points": points, "tool": tool, "tool_rotation": rotation}
+    return {name: array.astype(np.float32) for name, array in arrays.items()}

@@ -239,17 +239,25 @@ class Arm(Frozen):
         """The two ends of each joint in the base frame; they differ where a joint is prismatic.
 
         Args:
-            q: Joint coordinates in [rad] or [m]. Shape (n,).
+            q: Joint coordinates in [rad] or [m]. Shape (..., n).
 
         Returns:
-            Points in [m]. Shape (n, 2, 3).
+            Points in [m]. Shape (..., n, 2, 3).
 
         Raises:
-            InvalidInputError: q has the wrong length or is not finite.
+            InvalidInputError: q has the wrong shape or is not finite.
         """
-        out = np.empty((self.joints, 2, 3))
-        kinematics.joint_points(self.chain, float_array("q", q, (self.joints,)), out)
-        return out
+        rows, lead = self._rows(q)
+        points, here, rotation = np.empty((len(rows), self.joints, 2, 3)), np.zeros((len(rows), 3)), np.eye(3)
+        for i, (offset, axis, prismatic) in enumerate(zip(self.offsets, self.axes, self.prismatic, strict=True)):
+            points[:, i, 0] = here = here + rotation @ offset
+            if prismatic:
+                here = here + rows[:, i, None] * (rotation @ axis)
+            else:
+                cross, angle = np.cross(axis, np.eye(3)).T, rows[:, i, None, None]
+                rotation = rotation @ (np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+            points[:, i, 1] = here
+        return points.reshape(*lead, self.joints, 2, 3)
 
     def check_posture(self, name: str, q: FloatArray) -> None:
         """Refuses joint coordinates outside the limits.

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.kernels.jit import inlined, kernel
-from ikgym.kernels.rotations import rodrigues
 
 
 class Chain(NamedTuple):
@@ -157,42 +156,3 @@ def forward_and_jacobian_rows(chain, q, rotation, position, jacobian):
     """:func:`forward_and_jacobian` for N rows: as above, with ``jacobian`` (N, 6, n)."""
     for row in range(q.shape[0]):
         forward_and_jacobian(chain, q[row], rotation[row], position[row], jacobian[row])
-
-
-@kernel
-def joint_points(chain, q, points):
-    """Begin and end of each joint, for drawing.
-
-    Args:
-        chain: The arm, a :class:`Chain`.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        points: Receives per joint its point before and after its motion in [m]; they differ where the joint
-            is prismatic. Shape (n, 2, 3).
-    """
-    rotation = np.eye(3)
-    here = np.zeros(3)
-    for i in range(q.shape[0]):
-        _shift(rotation, chain.offsets[i], 1.0, here)
-        points[i, 0] = here
-        if chain.prismatic[i]:
-            _shift(rotation, chain.axes[i], q[i], here)
-        else:
-            rotation = _product(rotation, rodrigues(chain.axes[i], q[i]))
-        points[i, 1] = here
-
-
-# Written out, since numba's matrix product needs SciPy.
-@kernel
-def _shift(rotation, vector, length, point):
-    for i in range(3):
-        point[i] += length * (rotation[i, 0] * vector[0] + rotation[i, 1] * vector[1] + rotation[i, 2] * vector[2])
-
-
-@kernel
-def _product(first, second):
-    out = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for k in range(3):
-                out[i, j] += first[i, k] * second[k, j]
-    return out

@@ -114,16 +114,20 @@ class Draws:
 
     def one(self, key: int) -> DrawnPlant:
         """The plant that a key draws."""
+        plant = self._plant
+        if not (plant.other_arm or plant.context or np.any(plant.payload)):  # nothing to draw, and no kernel to compile
+            drives = float(np.max(plant.bandwidth)), plant.longest_command_delay, plant.payload
+            return DrawnPlant(self._arm, self._arm, plant.payload_step, *drives, context=np.empty(0))
         keys, out = np.array([key], dtype=np.uint64), self.blank(1)
         numbers, context = self.numbers(keys)
         self.arms(keys, np.zeros(1, dtype=np.int64), numbers, out)
         ends = np.empty((2, 1, 2, len(self._arm.bodies), 3))
         self.bodies(keys, np.zeros(1, dtype=np.int64), numbers, out.axes, (ends[0], ends[1]))
         before, after = (self._made(ends[:, 0, loaded], *(part[0, loaded] for part in out)) for loaded in range(2))
-        loaded = after if np.any(self._plant.payload) else before
+        loaded = after if np.any(plant.payload) else before
         bandwidth, delay, load = float(numbers.bandwidth[0]), int(numbers.command_delay[0]), float(numbers.load[0])
-        payload = scaled(self._plant.payload, load)
-        return DrawnPlant(before, loaded, self._plant.payload_step, bandwidth, delay, payload, context[0])
+        payload = scaled(plant.payload, load)
+        return DrawnPlant(before, loaded, plant.payload_step, bandwidth, delay, payload, context[0])
 
     def _made(self, ends: FloatArray, *chain: FloatArray) -> Arm:
         bodies = self._arm.bodies.replace(starts=ends[0], ends=ends[1])
