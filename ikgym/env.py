@@ -218,7 +218,7 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
         return observation(out, 0), {"context": self.context} if self.context.size else {}
 
-    def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: npt.ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; see the class for the returned values.
 
         Raises:

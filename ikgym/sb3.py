@@ -216,14 +216,14 @@ class RedundantIKVecEnv(VecEnv):
 
 
 class LearningVecEnv(RedundantIKVecEnv):
-    """N arms in the wrappers of :func:`ikgym.rl.make_vec`, for Stable-Baselines3.
+    """N arms of :func:`ikgym.rl.make_vec`, for Stable-Baselines3.
 
     As :class:`RedundantIKVecEnv`, but `TimeLimit.truncated` is False where a track is lost, and `episode` holds the
     return of the rewards that the agent sees.
 
     Args:
         num_envs: N.
-        task: The scenario and the parameters of the wrappers.
+        task: What is observed and rewarded, and what an action means.
         render_mode: None or `"rgb_array"`.
 
     Raises:
@@ -233,7 +233,9 @@ class LearningVecEnv(RedundantIKVecEnv):
 
     def __init__(self, num_envs: int, task: rl.Task, render_mode: str | None = None) -> None:
         self.task = task
-        self._take(task.arms(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode))
+        self._take(
+            rl.LearningVectorEnv(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode)
+        )
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """One picture a row, for `VecVideoRecorder` and `render()`."""
@@ -244,7 +246,7 @@ class LearningVecEnv(RedundantIKVecEnv):
 def make_vec(
     scenario: str | Scenario, num_envs: int = 1, *, render_mode: str | None = None, **changes: Any
 ) -> LearningVecEnv:
-    """N arms, wrapped for learning, for Stable-Baselines3.
+    """N arms, for learning, for Stable-Baselines3.
 
     >>> from stable_baselines3 import PPO
     >>> model = PPO("MlpPolicy", make_vec("panda-random", 8))

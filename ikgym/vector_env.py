@@ -173,7 +173,7 @@ class RedundantIKVectorEnv(
         self._record(out, begun=mask, rows=mask)
         return observation(out), contexts(self.context, mask)
 
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
+    def step(self, actions: npt.ArrayLike) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
         """One step of all arms; see the single environment for the returned values.
 
         Raises:

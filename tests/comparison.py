@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 
 def identical(a: Any, b: Any) -> bool:
@@ -27,3 +28,32 @@ def identical(a: Any, b: Any) -> bool:
     if a.dtype == object:
         return all(identical(x, y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
     return a.tobytes() == b.tobytes()
+
+
+def played_alike(native: Any, sync: Any, steps: int, largest: float = 1.2) -> list[Any]:
+    """Plays random actions in two vector environments, all of whose returned values have to be the same bit for bit.
+
+    Args:
+        native: The native one.
+        sync: Gymnasium's, of single ones, in the same autoreset mode. Ended rows are reset where the mode does not.
+        steps: How many.
+        largest: The largest action.
+
+    Returns:
+        The values that each step has returned.
+    """
+    assert native.metadata["autoreset_mode"] is native.autoreset_mode is sync.autoreset_mode  # TorchRL asks for either
+    for name in ("observation_space", "action_space", "single_observation_space", "single_action_space"):
+        assert getattr(native, name) == getattr(sync, name)
+    assert identical(native.reset(seed=11), sync.reset(seed=11))
+    rng, returned = np.random.default_rng(1), []
+    for _ in range(steps):
+        actions = rng.uniform(-largest, largest, native.action_space.shape).astype(np.float32)
+        returned.append(native.step(actions))
+        assert identical(returned[-1], sync.step(actions))
+        seen, _, terminated, truncated, _ = returned[-1]
+        assert native.observation_space.contains(seen)
+        ended = terminated | truncated
+        if native.autoreset_mode is AutoresetMode.DISABLED and ended.any():
+            assert identical(*(envs.reset(options={"reset_mask": ended.copy()}) for envs in (native, sync)))
+    return returned

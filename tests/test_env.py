@@ -20,10 +20,10 @@ from ikgym.trajectories import StraightLine
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 
-#: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held and with a late plant.
+#: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held, with a late plant and with one drawn from ranges.
 ONE_A_TASK = (
     *("varga7-fast", "varga7-random", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q1", "panda-glue"),
-    "panda-camera",
+    *("panda-camera", "learning-context"),
 )
 
 
