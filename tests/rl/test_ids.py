@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import pickle
 import warnings
 
 import gymnasium as gym
@@ -12,12 +11,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
-from stable_baselines3.common.env_util import make_vec_env
 
 import ikgym
-import ikgym.sb3
 from baselines.episodes import play
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
@@ -93,24 +90,6 @@ def test_native_vector_is_sync_of_singles_bit_for_bit(name, mode):
 
 
 @every_id
-def test_arms_of_stable_baselines3_are_dummy_ones_bit_for_bit(name):
-    ours, theirs = ikgym.sb3.make_vec(name, 2), make_vec_env(name, 2)
-    for envs in (ours, theirs):
-        envs.seed(3)
-    assert identical(ours.reset(), theirs.reset())
-    ends = 0
-    for actions in actions_of(gym.make_vec(name, 2), ours.scenario.steps + 3):
-        (seen, rewards, ended, infos), (*others, other_infos) = ours.step(actions), theirs.step(actions)
-        assert identical((seen, rewards, ended), others)
-        for row in np.flatnonzero(ended):
-            ends += 1
-            assert identical(infos[row]["terminal_observation"], other_infos[row]["terminal_observation"])
-            assert infos[row]["TimeLimit.truncated"] == other_infos[row]["TimeLimit.truncated"]
-            assert infos[row]["episode"]["r"] == pytest.approx(other_infos[row]["episode"]["r"], abs=1e-5)
-    assert ends >= 2
-
-
-@every_id
 def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
     env = gym.make(name)
     task, scenario = env.unwrapped.task, env.unwrapped.scenario
@@ -150,18 +129,6 @@ def test_an_episode_begins_at_its_first_step_also_after_a_lost_one(name):
 
 
 @every_id
-def test_pickled_in_mid_episode_it_goes_on_as_before(name):
-    env = gym.make(name)
-    env.reset(seed=2)
-    actions = actions_of(env, 6)
-    env.step(actions[0])
-    again = pickle.loads(pickle.dumps(env))
-    for action in actions[1:]:
-        assert identical(env.step(action)[:4], again.step(action)[:4])
-    assert identical(env.reset()[0], again.reset()[0])
-
-
-@every_id
 def test_wrappers_of_gymnasium(name):
     env = NormalizeObservation(RecordEpisodeStatistics(TimeLimit(gym.make(name, lost_distance=None), 4)))
     env.reset(seed=0)
@@ -172,18 +139,6 @@ def test_wrappers_of_gymnasium(name):
     assert info["episode"]["r"] == pytest.approx(sum(step[1] for step in steps))
     assert seen.shape == env.unwrapped.observation_space.shape
     assert np.abs(seen).max() < 10.0
-
-
-@one_id_at_least
-def test_an_episode_is_recorded(name, tmp_path):
-    pytest.importorskip("moviepy")
-    env = TimeLimit(gym.make(name, render_mode="rgb_array"), 4)
-    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
-    env.reset(seed=0)
-    for action in actions_of(env, 4):
-        env.step(action)
-    env.close()
-    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
 
 
 @every_id
