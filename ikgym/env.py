@@ -231,7 +231,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
         out = self._simulator.observe()
         self._step, self._ended = int(self._simulator.steps_made[0]), False
         for pictures in self._pictures:
-            pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
+            pictures.record(float(out.position_error[0]), float(out.orientation_error[0]), begins=True)
         return observation(out, 0), {"context": self.context} if self.context.size else {}
 
     def step(self, action: npt.ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -267,7 +267,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
         if self.scenario.proximity is not None:
             info["proximity_cost"] = met[2]
         for pictures in self._pictures:
-            pictures.add(position, orientation)
+            pictures.record(position, orientation)
         ends, over = self.lost_distance is not None, self._step == self._steps
         lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over

@@ -232,5 +232,5 @@ class RedundantIKVectorEnv(
         """Records the states of some rows for their pictures, if there are some; those that have begun start anew."""
         for row, pictures in enumerate(self._pictures):
             if rows[row]:
-                take = pictures.begin if begun[row] else pictures.add
-                take(float(out.position_error[row]), float(out.orientation_error[row]))
+                errors = float(out.position_error[row]), float(out.orientation_error[row])
+                pictures.record(*errors, begins=bool(begun[row]))
