@@ -30,14 +30,18 @@ def identical(a: Any, b: Any) -> bool:
     return a.tobytes() == b.tobytes()
 
 
-def played_alike(native: Any, sync: Any, steps: int, largest: float = 1.2) -> list[Any]:
-    """Plays random actions in two vector environments, all of whose returned values have to be the same bit for bit.
+def random_actions(envs: Any, steps: int, largest: float = 1.2) -> Any:
+    """Actions of a vector environment, uniform up to a largest one. Shape (steps, N, n)."""
+    return np.random.default_rng(1).uniform(-largest, largest, (steps, *envs.action_space.shape)).astype(np.float32)
+
+
+def played_alike(native: Any, sync: Any, actions: Any) -> list[Any]:
+    """Plays actions in two vector environments, all of whose returned values have to be the same bit for bit.
 
     Args:
         native: The native one.
         sync: Gymnasium's, of single ones, in the same autoreset mode. Ended rows are reset where the mode does not.
-        steps: How many.
-        largest: The largest action.
+        actions: Of each step. Shape (steps, N, n).
 
     Returns:
         The values that each step has returned.
@@ -46,11 +50,10 @@ def played_alike(native: Any, sync: Any, steps: int, largest: float = 1.2) -> li
     for name in ("observation_space", "action_space", "single_observation_space", "single_action_space"):
         assert getattr(native, name) == getattr(sync, name)
     assert identical(native.reset(seed=11), sync.reset(seed=11))
-    rng, returned = np.random.default_rng(1), []
-    for _ in range(steps):
-        actions = rng.uniform(-largest, largest, native.action_space.shape).astype(np.float32)
-        returned.append(native.step(actions))
-        assert identical(returned[-1], sync.step(actions))
+    returned = []
+    for action in actions:
+        returned.append(native.step(action))
+        assert identical(returned[-1], sync.step(action))
         seen, _, terminated, truncated, _ = returned[-1]
         assert native.observation_space.contains(seen)
         ended = terminated | truncated

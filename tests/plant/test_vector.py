@@ -90,5 +90,8 @@ def test_an_arm_seed_keeps_the_drives_too_but_no_noise():
     assert scenario.drawn_plant(1).bandwidth != scenario.drawn_plant(2).bandwidth
     env = ikgym.RedundantIKEnv(scenario)
     q = scenario.arm.home
-    seen = [env.reset(seed=seed, options={"q": q, "arm_seed": 3})[0]["q"] for seed in (1, 2)]
-    assert not (seen[0] == seen[1]).any()
+    (seen, info), (other, same) = (env.reset(seed=seed, options={"q": q, "arm_seed": 3}) for seed in (1, 2))
+    assert not (seen["q"] == other["q"]).any()
+    assert identical(info, same)
+    assert identical(info["context"], kept[0].context)
+    assert not identical(info, env.reset(seed=1)[1])
