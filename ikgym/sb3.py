@@ -84,11 +84,6 @@ class RedundantIKVecEnv(VecEnv):
         self._made = time.perf_counter()
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
-    @property
-    def preview(self) -> tuple[int, ...]:
-        """The steps ahead at which the nominal coordinates are shown."""
-        return self._envs.preview
-
     def reset(self) -> Observation:
         """Begins episodes in all rows, with the seeds and options of `seed()` and `set_options()`.
 

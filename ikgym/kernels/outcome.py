@@ -74,9 +74,9 @@ class Outcome(NamedTuple):
         return cost + self.proximity_cost if self.proximity_cost.size else cost
 
 
+_named: Any = namedtuple  # the types are those of Outcome
 #: Parts of an outcome: those of all scenarios, and those where the plant is not ideal or bodies can touch.
-Shown: Any = namedtuple("Shown", Outcome._fields[1:12])  # the types are those above
-More: Any = namedtuple("More", Outcome._fields[12:])
+Shown, More = _named("Shown", Outcome._fields[1:12]), _named("More", Outcome._fields[12:])
 
 #: The observation, see :func:`observation`.
 Observation = dict[str, Floats]
@@ -114,9 +114,9 @@ def outcome(
     none = numbers[:0].reshape(rows, 0)
     if h is None:
         commands, obstacles = none.reshape(rows, 0, n), none.reshape(rows, 0, OBSTACLE)
-        return Outcome(numbers, *shown, none, none, commands, shown.q, shown.pose, none, none, none, none, obstacles)
+        return Outcome._make((numbers, *shown, none, none, commands, shown.q, shown.pose, *4 * [none], obstacles))
     more = more_parts(numbers[rows * size(n, m, p) :], rows, n, m, h, o)
-    return Outcome(numbers, *shown, *(more if late else more._replace(q_age=none, pose_age=none)))
+    return Outcome._make((numbers, *shown, *(more if late else more._replace(q_age=none, pose_age=none))))
 
 
 def size(n: int, m: int, p: int) -> int:
