@@ -20,7 +20,7 @@ def tables(effort: Effort = FULL) -> list[Table]:
     for name, n in itertools.product(rl.IDS, sizes):
         envs = rl.IDS[name].arms(n, lost_distance=None)
         envs.reset(seed=0)
-        still = np.zeros(envs.action_space.shape, dtype=np.float32)
+        still = np.zeros((n, envs.scenario.joints), dtype=np.float32)
         made |= {(name, n, "reset"): envs.reset, (name, n, "step"): functools.partial(envs.step, still)}
     times = medians(made, effort.rounds, effort.seconds)
     rows: dict[str, tuple[float | None, ...]] = {

@@ -62,7 +62,7 @@ def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
 
 
 def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:
-    """Sums of the rewards of whole episodes, see :class:`ikgym.rl.DistanceReward`. Shape (episodes,)."""
+    """Sums of the rewards of whole episodes, see :class:`ikgym.rl.Task`. Shape (episodes,)."""
     out = np.empty((len(episodes), len(episodes[0].position_error)))
     for one, rewards in zip(episodes, out, strict=True):
         scales = task.radian, UNIT, task.zero

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import copy
+import dataclasses
 from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
 from ikgym import scenarios
@@ -26,7 +27,47 @@ REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_err
 OPTIONS = ("q", "arm_seed", "step")
 
 
-class RedundantIKEnv(gym.Env[Any, Any]):
+class Arms:
+    """What single and vector environments share: scenario, states of the arms, their pictures, the specification."""
+
+    def _set_arms(
+        self,
+        scenario: str | Scenario,
+        rows: int | None,
+        preview: Preview,
+        commands: int,
+        lost_distance: float | None,
+        render_mode: str | None,
+    ) -> tuple[spaces.Dict, spaces.Box]:
+        """Takes the arguments of an environment; returns the observation and the action space of one arm."""
+        self.scenario, self.render_mode = scenarios.find(scenario), render_mode
+        self._spec: EnvSpec | None = None
+        # First, since it checks the memory.
+        self._simulator = Simulator(self.scenario, rows, preview, commands=commands)
+        self.lost_distance = checked_distance(lost_distance)
+        self._pictures: list[Pictures] = []
+        if render_mode is not None:
+            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
+
+            self._pictures = [Pictures(self._simulator, row, render_mode) for row in range(rows or 1)]
+        return observation_space(self.scenario, preview, commands), action_space(self.scenario)
+
+    @property
+    def preview(self) -> tuple[int, ...]:
+        """Steps ahead at which the reference is shown."""
+        return self._simulator.preview
+
+    @property
+    def spec(self) -> EnvSpec | None:  # an attribute of the bases, which gym.make() and gym.make_vec() set
+        """The specification, with the steps of an episode, which only the scenario knows; None without `gym.make`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = None if spec is None else dataclasses.replace(spec, max_episode_steps=self.scenario.steps)
+
+
+class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     """Trajectory tracking with a redundant robot arm.
 
     ## Description
@@ -151,42 +192,17 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             raise InvalidInputError(
                 f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
             )
-        self.scenario = scenarios.find(scenario)
-        self._spec: EnvSpec | None = None
-        self.render_mode = render_mode
-        # First, since it checks the memory.
-        self._simulator = Simulator(self.scenario, None, preview, commands=commands)
-        self.observation_space = observation_space(self.scenario, preview, commands)
-        self.action_space = action_space(self.scenario)
+        own = self._set_arms(scenario, None, preview, commands, lost_distance, render_mode)
+        self.observation_space, self.action_space = own
         self._step, self._ended = -1, True  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
-        self.lost_distance = checked_distance(lost_distance)
         self._has_orientation = self.scenario.task.has_orientation
-        self._pictures: Pictures | None = None
-        if render_mode is not None:
-            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
-
-            self._pictures = Pictures(self._simulator, 0, render_mode)
-
-    @property
-    def preview(self) -> tuple[int, ...]:
-        """Steps ahead at which the reference is shown."""
-        return self._simulator.preview
 
     @property
     def context(self) -> FloatArray:
         """What the plant of the episode has drawn from ranges, see :class:`ikgym.plant.DrawnPlant`. Shape (c,)."""
         context: FloatArray = self._simulator.context[0].copy()
         return context
-
-    @property
-    def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make() sets
-        """The specification, with the steps of an episode; None without `gym.make`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = limited(spec, self.scenario)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -214,11 +230,11 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         self._ended = True  # until it is certain that the arm touches nothing
         out = self._simulator.observe()
         self._step, self._ended = int(self._simulator.steps_made[0]), False
-        if self._pictures is not None:
-            self._pictures.begin(float(out.position_error[0]), float(out.orientation_error[0]))
+        for pictures in self._pictures:
+            pictures.record(float(out.position_error[0]), float(out.orientation_error[0]), begins=True)
         return observation(out, 0), {"context": self.context} if self.context.size else {}
 
-    def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: npt.ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Applies joint velocities for one time step; see the class for the returned values.
 
         Raises:
@@ -250,8 +266,8 @@ class RedundantIKEnv(gym.Env[Any, Any]):
             cost += met[2]
         if self.scenario.proximity is not None:
             info["proximity_cost"] = met[2]
-        if self._pictures is not None:
-            self._pictures.add(position, orientation)
+        for pictures in self._pictures:
+            pictures.record(position, orientation)
         ends, over = self.lost_distance is not None, self._step == self._steps
         lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over
@@ -266,23 +282,14 @@ class RedundantIKEnv(gym.Env[Any, Any]):
         Raises:
             ResetNeededError: There is no episode yet.
         """
-        if self._pictures is None:
+        if not self._pictures:
             gym.logger.warn("render() draws nothing without a render_mode; give one to gym.make().")
             return None
         if self._step < 0:
             raise ResetNeededError("render() needs an episode: call reset() first.")
-        return self._pictures.draw()
+        return self._pictures[0].draw()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        if self._pictures is not None:
-            self._pictures.close()
-
-
-def limited(spec: EnvSpec | None, scenario: Scenario) -> EnvSpec | None:
-    """A copy of a specification with the number of steps, which only the scenario knows."""
-    if spec is None:
-        return None
-    spec = copy.copy(spec)
-    spec.max_episode_steps = scenario.steps
-    return spec
+        for pictures in self._pictures:
+            pictures.close()

@@ -14,12 +14,11 @@ from gymnasium.vector import AutoresetMode
 
 from ikgym import rl
 from ikgym.env import OPTIONS, REPORTED
-from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError, NoAttributeError
 from ikgym.options import checked_options
-from ikgym.rows import ArmRow
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
-from ikgym.validation import BoolArray, FloatArray, float_array
+from ikgym.validation import BoolArray
 from ikgym.vector_env import RedundantIKVectorEnv
 
 try:
@@ -68,11 +67,6 @@ class RedundantIKVecEnv(VecEnv):
     def __init__(
         self, num_envs: int = 1, scenario: str | Scenario = "varga7-fast", preview: Preview = 2, commands: int = 0
     ) -> None:
-        if isinstance(num_envs, gym.vector.VectorEnv):
-            raise InvalidInputError(
-                f"num_envs: expected how many arms, got Gymnasium's vector environment, {type(num_envs).__name__}, "
-                "which Stable-Baselines3 cannot step: RedundantIKVecEnv(N, scenario, preview) has the same arms for it."
-            )
         envs = RedundantIKVectorEnv(num_envs, scenario, preview, AutoresetMode.SAME_STEP, commands=commands)
         worst, most = envs.scenario.largest_step_cost(), float(np.finfo(np.float32).max)
         if worst > most:
@@ -82,20 +76,13 @@ class RedundantIKVecEnv(VecEnv):
             )
         self._take(envs)
 
-    def _take(self, envs: Any) -> None:
+    def _take(self, envs: RedundantIKVectorEnv) -> None:
         """Sets the vector environment, which begins new episodes in the same step."""
         self._envs, self.scenario = envs, envs.scenario
-        self._rows = [ArmRow(envs, index) for index in range(envs.num_envs)]
-        self._actions: npt.NDArray[Any] | None = None
+        self._actions: Any = None
         self._returns, self._lengths = np.zeros(envs.num_envs), np.zeros(envs.num_envs, dtype=np.int64)
         self._made = time.perf_counter()
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
-
-    @property
-    def preview(self) -> tuple[int, ...]:
-        """The steps ahead at which the nominal coordinates are shown."""
-        ahead: tuple[int, ...] = self._envs.unwrapped.preview
-        return ahead
 
     def reset(self) -> Observation:
         """Begins episodes in all rows, with the seeds and options of `seed()` and `set_options()`.
@@ -156,31 +143,31 @@ class RedundantIKVecEnv(VecEnv):
         self._envs.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of rows: `scenario`, spaces, `np_random`, … and those that `set_attr` added.
+        """An attribute of rows: `scenario`, `np_random`, spaces and others.
 
         Raises:
             NoAttributeError: They have no such attribute.
         """
-        return [getattr(self._rows[index], attr_name) for index in self._get_indices(indices)]
+        found = self._envs.get_attr(attr_name)
+        return [found[index] for index in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Sets a new attribute of rows; the arms use none.
+        """Refused: all arms share their attributes.
 
         Raises:
-            NoAttributeError: All arms share it, such as the scenario.
+            NoAttributeError: Always.
         """
-        for index in self._get_indices(indices):
-            setattr(self._rows[index], attr_name, value)
+        raise NoAttributeError(f"{attr_name!r} of one arm cannot be set: make another environment.")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of rows; arms are not reset or stepped one by one.
+        """Refused: arms are reset, stepped and drawn together.
 
         Raises:
-            NoAttributeError: Rows have no such method.
+            NoAttributeError: Always.
         """
-        return [method(*method_args, **method_kwargs) for method in self.get_attr(method_name, indices)]
+        raise NoAttributeError(f"The arms have no method {method_name!r}: they are reset, stepped and drawn together.")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
         """True for `Monitor`: SB3 asks whether ``info["episode"]`` holds the return before other wrappers."""
@@ -195,35 +182,23 @@ class RedundantIKVecEnv(VecEnv):
         }
 
     def _checked_options(self) -> dict[str, Any]:
-        """The options of all rows as one."""
+        """The options of all rows as one: each is given for all of them, but `arm_seed` and `step`."""
         if len(self._options) != self.num_envs:
             raise InvalidInputError(f"options: expected {self.num_envs}, one a row, got {len(self._options)}.")
         given = [checked_options(options, OPTIONS) for options in self._options]
-        columns = {name: [options.get(name) for options in given] for name in ("arm_seed", "step")}
-        kept = {name: column for name, column in columns.items() if any(value is not None for value in column)}
-        return {**kept, **self._checked_starts([options.get("q") for options in given])}
-
-    def _checked_starts(self, starts: list[Any]) -> dict[str, FloatArray]:
-        """The starts of all rows as one option."""
-        given = [float_array("options['q']", q, (self.scenario.joints,)) for q in starts if q is not None]
-        if not given:
-            return {}
-        if len(given) < self.num_envs:
-            raise InvalidInputError(
-                f"options: expected a start 'q' for all rows or for none, got {len(given)} of {self.num_envs}."
-            )
-        return {"q": np.stack(given)}
+        columns = {name: [options.get(name) for options in given] for name in OPTIONS}
+        return {name: column for name, column in columns.items() if any(value is not None for value in column)}
 
 
 class LearningVecEnv(RedundantIKVecEnv):
-    """N arms in the wrappers of :func:`ikgym.rl.make_vec`, for Stable-Baselines3.
+    """N arms of :func:`ikgym.rl.make_vec`, for Stable-Baselines3.
 
     As :class:`RedundantIKVecEnv`, but `TimeLimit.truncated` is False where a track is lost, and `episode` holds the
     return of the rewards that the agent sees.
 
     Args:
         num_envs: N.
-        task: The scenario and the parameters of the wrappers.
+        task: What is observed and rewarded, and what an action means.
         render_mode: None or `"rgb_array"`.
 
     Raises:
@@ -233,18 +208,19 @@ class LearningVecEnv(RedundantIKVecEnv):
 
     def __init__(self, num_envs: int, task: rl.Task, render_mode: str | None = None) -> None:
         self.task = task
-        self._take(task.arms(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode))
+        self._take(
+            rl.LearningVectorEnv(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode)
+        )
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """One picture a row, for `VecVideoRecorder` and `render()`."""
-        pictures: Sequence[npt.NDArray[np.uint8] | None] = self._envs.render()
-        return pictures
+        return self._envs.render() or ()
 
 
 def make_vec(
     scenario: str | Scenario, num_envs: int = 1, *, render_mode: str | None = None, **changes: Any
 ) -> LearningVecEnv:
-    """N arms, wrapped for learning, for Stable-Baselines3.
+    """N arms, for learning, for Stable-Baselines3.
 
     >>> from stable_baselines3 import PPO
     >>> model = PPO("MlpPolicy", make_vec("panda-random", 8))

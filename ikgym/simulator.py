@@ -24,7 +24,6 @@ from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, entered_states
 from ikgym.scenarios.frames.motion import MotionFrames, frames_of_rows
-from ikgym.scenarios.frames.nominal import MEMORY, NominalFrames
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
 from ikgym.validation import FloatArray, whole_number
@@ -44,8 +43,6 @@ class Simulator:
         scenario: The tracking problem.
         rows: N, or None for one arm whose actions have no row axis.
         preview: How many steps ahead the nominal coordinates are shown: 1 … p for an int p, or those of a sequence.
-        memory: Most memory for the nominal frames of all rows, in bytes. Those of random episodes that would take more
-            are computed block by block; a block is never shorter than the preview looks ahead.
         commands: How many of the last commands are shown.
 
     Raises:
@@ -53,9 +50,7 @@ class Simulator:
             or steps.
     """
 
-    def __init__(
-        self, scenario: Scenario, rows: int | None, preview: Preview, memory: int = MEMORY, commands: int = 0
-    ) -> None:
+    def __init__(self, scenario: Scenario, rows: int | None, preview: Preview, commands: int = 0) -> None:
         joints, coordinates = scenario.joints, scenario.task.size
         commands = whole_number("commands", commands, at_least=0)
         ideal, self._late = scenario.plant.ideal and not commands and not scenario.collides, scenario.plant.late
@@ -65,7 +60,7 @@ class Simulator:
         rows = 1 if rows is None else rows
         self.scenario, self.rows, self._limited = scenario, rows, scenario.arm.limited
         self.preview = offsets(preview)
-        self._nominal = frames_of_rows(scenario, rows, self.preview, memory, AT_ONCE)
+        self._nominal = frames_of_rows(scenario, rows, self.preview, AT_ONCE)
         shown = size(joints, coordinates, len(self.preview))
         if not ideal:
             obstacles = len(scenario.surroundings.boxes) if scenario.obstacles_shown else 0
@@ -148,7 +143,7 @@ class Simulator:
         state.q[rows], state.qdot[rows], state.step[rows] = q, 0.0, 0
         self._own_start[rows], self._ready = starts is None, 0
         if scenario.random:
-            self._nominal.begin(state.frames, rows, episodes, steps)
+            self._nominal.begin(state.frames, rows, episodes)
         if steps.any():
             later = steps > 0
             entered = rows[later]
@@ -207,7 +202,7 @@ class Simulator:
                 then.
         """
         active = self._all if active is None else active
-        self._accept(actions, active)
+        take_actions(actions, self._action_shape, active, self._state.actions)
         out = self._outcome(self._new(self._count))
         self._run(active, out.numbers, moving=True)
         return out
@@ -219,7 +214,7 @@ class Simulator:
             The observation, without a row axis; costs, errors and whether the action was clipped; joints held back;
             where bodies can touch, the clearance in [m], 1 for an arm that is stopped, and Φ^C, else nothing.
         """
-        self._accept(action, self._all)
+        take_actions(action, self._action_shape, self._all, self._state.actions)
         numbers = np.empty(self._count)
         if self._motions and (made := int(self._state.step[0])) >= self._ready:
             self._ready = made + AT_ONCE
@@ -264,13 +259,6 @@ class Simulator:
     def steps_made(self) -> npt.NDArray[np.int64]:
         """Steps made in each row's episode. Shape (N,)."""
         return self._state.step
-
-    def _accept(self, actions: npt.ArrayLike, active: npt.NDArray[np.bool_]) -> None:
-        """Takes actions over, if they are good, and prepares the active rows for their step."""
-        take_actions(actions, self._action_shape, active, self._state.actions)
-        if isinstance(self._nominal, NominalFrames) and self._nominal.in_blocks:
-            rows = np.flatnonzero(active)
-            self._nominal.look_ahead(self._state.frames, rows, self._state.step[rows] + 1)
 
     def _run(self, active: npt.NDArray[np.bool_], numbers: FloatArray, *, moving: bool) -> None:
         grain = GRAIN_STEP * self.rows // max(int(np.count_nonzero(active)), 1)

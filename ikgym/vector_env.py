@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from ikgym import scenarios
-from ikgym.env import OPTIONS, RedundantIKEnv, limited
-from ikgym.exceptions import InvalidInputError, ResetNeededError
+from ikgym.env import OPTIONS, Arms, RedundantIKEnv
+from ikgym.exceptions import InvalidInputError, NoAttributeError, ResetNeededError
 from ikgym.kernels.outcome import Observation, Outcome, observation
-from ikgym.options import checked_distance, checked_mask, checked_mode, checked_options, checked_seeds
-from ikgym.rows import ArmRow, Hinting, Infos, contexts, infos_of, last_observations, lost_rows
+from ikgym.options import checked_mask, checked_mode, checked_options, checked_seeds
+from ikgym.rows import Hinting, Infos, contexts, infos_of, last_observations, lost_rows
 from ikgym.scenarios import Preview, Scenario
-from ikgym.simulator import Simulator
-from ikgym.spaces import action_space, observation_space
 from ikgym.validation import BoolArray, FloatArray, whole_number
 
 
 class RedundantIKVectorEnv(
-    gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]], metaclass=Hinting
+    Arms, gym.vector.VectorEnv[Observation, npt.NDArray[np.float32], npt.NDArray[Any]], metaclass=Hinting
 ):
     """N times :class:`ikgym.RedundantIKEnv`, stepped by one compiled kernel.
 
@@ -40,7 +35,7 @@ class RedundantIKVectorEnv(
     | `SAME_STEP` | it is reset at once: the last observation and info are in `final_obs` and `final_info` |
     | `DISABLED` | it must be reset with a mask before the next step, which is an error otherwise |
 
-    `get_attr`, `set_attr` and `call` work for attributes of single environments; no row is stepped or drawn alone.
+    `get_attr` has the attributes of single environments; no row is stepped or drawn alone.
 
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is true;
     `{"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `{"arm_seed": …}` keeps arms, and
@@ -83,58 +78,32 @@ class RedundantIKVectorEnv(
         self.autoreset_mode = checked_mode(autoreset_mode)
         own = {"render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.metadata = RedundantIKEnv.metadata | own
-        self.scenario = scenarios.find(scenario)
+        one = self._set_arms(scenario, self.num_envs, preview, commands, lost_distance, render_mode)
         if max_episode_steps not in (None, self.scenario.steps):
             raise InvalidInputError(
                 f"max_episode_steps: expected the {self.scenario.steps} of the scenario, got {max_episode_steps!r}."
             )
-        self._spec: EnvSpec | None = None
-        # First, since it checks the memory.
-        self._simulator = Simulator(self.scenario, self.num_envs, preview, commands=commands)
-        self.single_observation_space = observation_space(self.scenario, preview, commands)
-        self.single_action_space = action_space(self.scenario)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.lost_distance = checked_distance(lost_distance)
+        self.single_observation_space, self.single_action_space = one
+        self.observation_space, self.action_space = (batch_space(space, self.num_envs) for space in one)
         self._generators: dict[int, np.random.Generator] = {}
         self._seeds: dict[int, int] = {}
-        self.render_mode = render_mode
-        self._pictures: list[Pictures] = []
-        if render_mode is not None:
-            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
-
-            self._pictures = [Pictures(self._simulator, row, render_mode) for row in range(self.num_envs)]
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-
-    @property
-    def preview(self) -> tuple[int, ...]:
-        """Steps ahead at which the reference is shown."""
-        return self._simulator.preview
 
     @property
     def context(self) -> FloatArray:
         """The contexts of the rows' episodes. Shape (N, c)."""
         return self._simulator.context
 
-    @property
-    def spec(self) -> EnvSpec | None:  # an attribute of the base, which gym.make_vec() sets
-        """The specification, with the steps of an episode; None without `gym.make_vec`."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = limited(spec, self.scenario)
-
     @property  # type: ignore[misc]  # read-only and one a row, as SyncVectorEnv has it
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The rows' generators, made from fresh entropy where there was no seed."""
-        return tuple(self.generator(row)[0] for row in range(self.num_envs))
+        return tuple(self._generator(row)[0] for row in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seeds of the rows' generators."""
-        return tuple(self.generator(row)[1] for row in range(self.num_envs))
+        return tuple(self._generator(row)[1] for row in range(self.num_envs))
 
     def reset(
         self,
@@ -173,7 +142,7 @@ class RedundantIKVectorEnv(
         self._record(out, begun=mask, rows=mask)
         return observation(out), contexts(self.context, mask)
 
-    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
+    def step(self, actions: npt.ArrayLike) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
         """One step of all arms; see the single environment for the returned values.
 
         Raises:
@@ -224,45 +193,35 @@ class RedundantIKVectorEnv(
             raise ResetNeededError("render() needs episodes: call reset() first.")
         return tuple(one.draw() for one in self._pictures)
 
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Attributes of the rows; callable ones are called, as in `SyncVectorEnv`.
-
-        Raises:
-            NoAttributeError: Rows have no such attribute.
-        """
-        found = [getattr(row, name) for row in self._rows]
-        return tuple(one(*args, **kwargs) if callable(one) else one for one in found)
-
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Attributes of the rows: `scenario`, spaces, `np_random`, … and those set by `set_attr`.
+        """An attribute of each row: `scenario`, `np_random`, spaces and others.
 
         Raises:
             NoAttributeError: They have no such attribute.
         """
-        return self.call(name)
+        shared = {
+            "scenario": self.scenario,
+            "observation_space": self.single_observation_space,
+            "action_space": self.single_action_space,
+            "metadata": RedundantIKEnv.metadata,
+            "render_mode": self.render_mode,
+        }
+        own = ("np_random", "np_random_seed")
+        if name in own:
+            return getattr(self, name)  # type: ignore[no-any-return]  # one a row
+        if name not in shared:
+            raise NoAttributeError(
+                f"The arms of a native vector environment have no {name!r}: they are reset, stepped and seen together. "
+                f"Available: {', '.join((*shared, *own))}. Environments one by one: gym.make_vec(…, "
+                "vectorization_mode='sync')."
+            )
+        return (shared[name],) * self.num_envs
 
-    def set_attr(self, name: str, values: Any) -> None:
-        """Sets an attribute of the rows, which the arms ignore: one value a row in a list or tuple, or one for all.
-
-        Raises:
-            NoAttributeError: All arms share it, such as the scenario: make another environment.
-            InvalidInputError: There are more or fewer values than rows.
-        """
-        values = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
-        if len(values) != self.num_envs:
-            raise InvalidInputError(f"values: expected {self.num_envs}, one a row, got {len(values)}.")
-        for row, value in zip(self._rows, values, strict=True):
-            setattr(row, name, value)
-
-    def generator(self, row: int) -> tuple[np.random.Generator, int]:
+    def _generator(self, row: int) -> tuple[np.random.Generator, int]:
         """A row's generator and its seed, made from fresh entropy where there was none."""
         if row not in self._generators:
             self._generators[row], self._seeds[row] = seeding.np_random()
         return self._generators[row], self._seeds[row]
-
-    @functools.cached_property
-    def _rows(self) -> list[ArmRow]:
-        return [ArmRow(self, index) for index in range(self.num_envs)]
 
     def _begin(self, mask: BoolArray, **chosen: Any) -> None:
         self._simulator.reset(mask, self._generators, **chosen)
@@ -273,5 +232,5 @@ class RedundantIKVectorEnv(
         """Records the states of some rows for their pictures, if there are some; those that have begun start anew."""
         for row, pictures in enumerate(self._pictures):
             if rows[row]:
-                take = pictures.begin if begun[row] else pictures.add
-                take(float(out.position_error[row]), float(out.orientation_error[row]))
+                errors = float(out.position_error[row]), float(out.orientation_error[row])
+                pictures.record(*errors, begins=bool(begun[row]))

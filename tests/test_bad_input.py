@@ -5,7 +5,6 @@ import functools
 import re
 import typing
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -359,14 +358,10 @@ REFUSED = [
     ("ahead: expected rising times", lambda: ikgym.rl.make(FAST, ahead=(0.05, 0.01))),
     ("no field of Task 'preview'", lambda: ikgym.rl.make(FAST, preview=1)),
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
-    ("RedundantIK-v0", lambda: ikgym.rl.TrackObservation(gym.make("CartPole-v1"))),
-    ("its own observation", lambda: ikgym.rl.TrackObservation(ikgym.rl.make(FAST))),
     ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
-    ("its own observation", lambda: ikgym.rl.vector.TrackObservation(ikgym.rl.make_vec(FAST, 2))),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
-        ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("zero", 0.0), ("fine", 0.0),
+        ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("zero", 0.0), ("fine", 0.0), ("history", 0),
     )),
-    ("length", lambda: ikgym.rl.make(FAST, history=0)),
 ]  # fmt: skip
 
 

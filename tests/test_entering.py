@@ -26,22 +26,6 @@ def test_an_episode_is_entered_on_its_joint_path(name):
     assert info["time"] == 251 * scenario.dt
 
 
-def test_blocks_of_reference_poses_begin_where_an_episode_is_entered():
-    """Rows whose reference is computed block by block see what those see that know all of it."""
-    from ikgym.simulator import Simulator
-
-    scenario = ikgym.scenarios.get("varga7-random")
-    seen = []
-    for memory in (2**26, 8 * 12 * 2 * 40):
-        simulator = Simulator(scenario, 2, (1, 5), memory)
-        given = simulator.checked({"step": [700, 3]})
-        simulator.reset(np.ones(2, dtype=bool), list(map(np.random.default_rng, range(2))), **given)
-        for _ in range(60):
-            out = simulator.step(np.zeros((2, 7)))
-        seen.append(out.numbers)
-    assert np.array_equal(*seen)
-
-
 def test_rows_enter_one_by_one():
     envs = gym.make_vec("RedundantIK-v0", num_envs=3, scenario="varga7-random")
     observation, _ = envs.reset(seed=0, options={"step": [None, 5, 900]})

@@ -1,6 +1,5 @@
 """The single environment against its specification, Gymnasium's checker and Stable-Baselines3's."""
 
-import functools
 import re
 import warnings
 
@@ -20,10 +19,10 @@ from ikgym.trajectories import StraightLine
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
 
-#: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held and with a late plant.
+#: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held, with a late plant and with one drawn from ranges.
 ONE_A_TASK = (
     *("varga7-fast", "varga7-random", "planar2-bent", "zhang3-helix", "zhang6-lspb", "khan8-q1", "panda-glue"),
-    "panda-camera",
+    *("panda-camera", "learning-context"),
 )
 
 
@@ -207,20 +206,6 @@ def test_global_random_state_is_left_alone():
     env.reset(seed=1)
     env.step(np.zeros(7, dtype=np.float32))
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
-
-
-@pytest.mark.slow  # the environments by id have one that always runs
-def test_spawned_workers():
-    maker = functools.partial(gym.make, "ikgym:RedundantIK-v0", scenario="varga7-random", preview=1)
-    envs = gym.vector.AsyncVectorEnv([maker] * 2, context="spawn")
-    try:
-        observation, _ = envs.reset(seed=3)
-        here = make("varga7-random", preview=1)
-        assert identical(observation["nominal"][1], here.reset(seed=4)[0]["nominal"])
-        *_, infos = envs.step(np.zeros((2, 7), dtype=np.float32))
-        assert infos["_time"].all()
-    finally:
-        envs.close()
 
 
 def test_ids_and_arguments():

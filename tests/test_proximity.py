@@ -10,7 +10,8 @@ from baselines.evaluate import evaluate
 from baselines.fingerprints import fingerprint
 from baselines.oracle.episode import EpisodeProblem
 from ikgym.exceptions import InvalidInputError
-from tests.test_collisions import among, person, wild
+from tests.comparison import played_alike
+from tests.test_collisions import among, person, vectors_of, wild
 
 # Two bodies of the arm are always 15 mm apart.
 NEAR = ikgym.ProximityCost(0.014, 0.005, 3.0, 1.5)
@@ -24,19 +25,12 @@ def depth_cost(clearance):
 
 
 def test_one_arm_many_in_a_loop_and_many_at_once_pay_what_the_formula_says():
-    near = CROWD.replace(proximity=NEAR)
-    modes = ("sync", "vector_entry_point")
-    vectors = [gym.make_vec("RedundantIK-v0", num_envs=5, scenario=near, vectorization_mode=mode) for mode in modes]
-    [envs.reset(seed=3) for envs in vectors]
-    paid = []
-    for k, action in enumerate(wild(5, 200), start=1):
-        (_, loop, _, _, info), (_, native, _, _, infos) = [envs.step(action) for envs in vectors]
-        np.testing.assert_array_equal(loop, native)
-        np.testing.assert_array_equal(info["proximity_cost"], infos["proximity_cost"])
+    returned, paid = played_alike(*vectors_of(CROWD.replace(proximity=NEAR)), wild(5, 200)), []
+    for k, (_, rewards, _, _, infos) in enumerate(returned, start=1):
         expected = [depth_cost(one) if k % 2 == 0 else 0.0 for one in infos["clearance"]]
         np.testing.assert_allclose(infos["proximity_cost"], expected, rtol=1e-12)
         total = infos["tracking_cost"] + infos["velocity_cost"] + infos["proximity_cost"]
-        np.testing.assert_array_equal(native, -total)
+        np.testing.assert_array_equal(rewards, -total)
         paid.append(infos["proximity_cost"])
     assert infos["collision"].any()
     assert 0.0 < np.mean(np.array(paid)[1::2] > 0.0) < 1.0

@@ -10,7 +10,6 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 
 import ikgym
-from ikgym import arms
 from ikgym.rendering import Renderer, renderer, scene, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 from tests.bodied import crowd
@@ -41,7 +40,7 @@ def move(env, fraction=0.5):
 
 
 def renderer_of(env):
-    return env.unwrapped._pictures.renderer
+    return env.unwrapped._pictures[0]
 
 
 def artist(env, name):
@@ -65,11 +64,7 @@ def count_paintings(monkeypatch):
     return painted
 
 
-#: Joints that slide and turn, held points, in the plane and in space.
-ONE_OF_EACH = ("varga7-random", "khan8-q1", "planar2-bent", "panda-circle", "tiago-raster")
-
-
-@pytest.mark.parametrize("name", ONE_OF_EACH)
+@pytest.mark.parametrize("name", ["varga7-random", "khan8-q1", "planar2-bent", "panda-circle", "tiago-raster"])
 def test_arms_and_paths_give_a_picture_of_the_same_even_size(name):
     env = environment(name)
     move(env)
@@ -123,15 +118,18 @@ def test_prismatic_joints_have_an_artist_of_their_own():
     assert np.isnan(links).all(axis=1).sum() == prismatic.sum()
 
 
-def test_tool_target_and_paths_are_where_they_should_be():
+@pytest.mark.parametrize("step", [0, 5])
+def test_tool_target_and_paths_are_where_they_should_be(step):
+    """Also where the episode is entered later."""
     env = environment()
+    env.reset(options={"step": step})
     for _ in range(4):
         observation, *_ = move(env)
     env.render()
     rotation, tool = env.scenario.arm.forward(observation["q"])
     nominal = env._simulator.nominal_positions(0)
     np.testing.assert_allclose(np.ravel(artist(env, "tool").get_data_3d()), tool)
-    np.testing.assert_allclose(np.ravel(artist(env, "target").get_data_3d()), nominal[4])
+    np.testing.assert_allclose(np.ravel(artist(env, "target").get_data_3d()), nominal[step + 4])
     np.testing.assert_allclose(np.transpose(artist(env, "nominal path").get_data_3d()), nominal)
     actual = np.transpose(artist(env, "actual path").get_data_3d())
     assert len(actual) == 5
@@ -160,11 +158,11 @@ def test_the_orientation_error_is_shown_where_the_task_has_one(name, panels):
 
 
 def test_long_curves_are_thinned_and_keep_their_peaks():
-    arm, states = arms.get("zhang3"), 10_000
-    drawn = Renderer(arm, "rgb_array", title="long", has_orientation=False)
-    drawn.begin(np.ones((states, 3)), 0.001 * (states - 1))
+    states = 10_000
+    drawn = Renderer(short("zhang3-helix", states - 1).replace(dt=0.001), "rgb_array")
+    drawn.begin(np.ones((states, 3)))
     for k in range(states):
-        drawn.add(np.full(3, 1e-4 * k), 5.0 if k == 1234 else 1e-3, np.nan, 0.001 * k)
+        drawn.add(k, np.full(3, 1e-4 * k), 5.0 if k == 1234 else 1e-3, np.nan)
     drawn.draw()
     (line,) = drawn.figure.findobj(lambda a: a.get_gid() == "position error")
     assert len(line.get_xdata()) <= style.MOST_POINTS + 1
@@ -172,18 +170,12 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
     assert line.get_xdata()[-1] == pytest.approx(0.001 * (states - 1))
 
 
-#: Arms, joint coordinates and errors that are drawn at the worst: each value once, not all together, since the picture
-#: of the arm and the curves of its errors do not know each other.
-WORST = [*(("varga7", q, error) for q, error in ((0.0, 0.0), (0.0, 1e300), (-1e9, np.inf), (1e6, 1e-300)))]
-
-
-@pytest.mark.parametrize(("name", "q", "error"), WORST)
-def test_nothing_is_too_far_or_too_small_to_be_drawn(name, q, error):
-    arm = arms.get(name)
-    drawn = Renderer(arm, "rgb_array", title="$diverges_", has_orientation=True)
-    drawn.begin(np.linspace(0.0, 1.0, 3)[:, None] * np.ones(3), 2.0)
+@pytest.mark.parametrize(("q", "error"), [(0.0, 0.0), (0.0, 1e300), (-1e9, np.inf), (1e6, 1e-300)])
+def test_nothing_is_too_far_or_too_small_to_be_drawn(q, error):
+    drawn = Renderer(short(steps=2), "rgb_array", title="$diverges_")
+    drawn.begin(np.linspace(0.0, 1.0, 3)[:, None] * np.ones(3))
     for k in range(3):
-        drawn.add(np.full(arm.joints, q * (k > 0)), error if k else 0.0, error, float(k))
+        drawn.add(k, np.full(7, q * (k > 0)), error if k else 0.0, error)
     assert not blank(drawn.draw())
 
 

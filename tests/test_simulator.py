@@ -9,6 +9,7 @@ import typing
 
 import numpy as np
 import pytest
+from gymnasium.utils import seeding
 
 import ikgym
 import ikgym.simulator as simulator_module
@@ -44,45 +45,33 @@ class Bent(RandomSinusoid):
         return dataclasses.replace(super().sample(rng), sigmoid=float(rng.uniform(0.1, 0.4)), offset=0.3)
 
 
-def random_scenarios():
-    drawn = ikgym.scenarios.get("varga7-random").replace(steps=60)
-    wanderer = ikgym.scenarios.get("zhang3-helix").replace(trajectory=Wanderer(), initial_pose=None, steps=60)
-    return {
-        "sinusoids": drawn,
-        "held": drawn.replace(iterations_per_point=(3, 2)),
-        "bent": drawn.replace(trajectory=Bent(drawn.trajectory.amplitude)),
-        "wanderer": wanderer,
-        "noisy": drawn.replace(plant=ikgym.Plant(noise=0.3)),
-        "splines": ikgym.scenarios.get("panda-random").replace(steps=60),
-        "splines-held": ikgym.scenarios.get("panda-payload").replace(steps=60, iterations_per_point=(3, 2)),
-    }
+DRAWN = ikgym.scenarios.get("varga7-random").replace(steps=60)
+WANDERER = ikgym.scenarios.get("zhang3-helix").replace(trajectory=Wanderer(), initial_pose=None, steps=60)
+RANDOM = {
+    "sinusoids": DRAWN,
+    "held": DRAWN.replace(iterations_per_point=(3, 2)),
+    "bent": DRAWN.replace(trajectory=Bent(DRAWN.trajectory.amplitude)),
+    "wanderer": WANDERER,
+    "splines-held": ikgym.scenarios.get("panda-payload").replace(steps=60, iterations_per_point=(3, 2)),
+}
 
 
 @pytest.mark.parametrize("preview", [1, (2, 13), (1, 200)])
-@pytest.mark.parametrize("name", random_scenarios())
-def test_blocks_of_nominal_frames_are_the_whole_table_bit_for_bit(name, preview):
-    """Rows begin new episodes at different times, so that they stand in different blocks."""
-    scenario = random_scenarios()[name]
-    whole, in_blocks = Simulator(scenario, ROWS, preview), Simulator(scenario, ROWS, preview, memory=0)
-    points = int(scenario.points(preview)[-1]) + 1
-    ahead = in_blocks.preview[-1]
-    sizes = [simulator._state.frames.shape[1] for simulator in (whole, in_blocks)]
-    if name in {"bent", "wanderer"}:
-        assert sizes == [points, 2 * ahead if ahead < points else points]
-    else:  # never whole
-        assert sizes == 2 * [ahead + simulator_module.AT_ONCE]
-    rng, generators = np.random.default_rng(4), [[np.random.default_rng(i) for i in range(ROWS)] for _ in range(2)]
-    active = np.ones(ROWS, dtype=bool)
-    for k in range(150):
-        if k > 0:
-            active = (whole.steps_made == scenario.steps) | (rng.random(ROWS) < 0.02)
-        for simulator, own in zip((whole, in_blocks), generators, strict=True):
-            simulator.reset(active, own)
-        assert identical(whole.observe().numbers, in_blocks.observe().numbers)
-        actions, stepping = rng.uniform(-0.1, 0.1, (ROWS, scenario.joints)), rng.random(ROWS) < 0.9
-        assert identical(whole.step(actions, stepping).numbers, in_blocks.step(actions, stepping).numbers)
-    for row in range(ROWS):
-        assert identical(whole.nominal_positions(row), in_blocks.nominal_positions(row))
+@pytest.mark.parametrize("name", RANDOM)
+def test_what_is_shown_ahead_is_the_nominal_of_each_rows_episode(name, preview):
+    """Rows begin new episodes at different times, or enter them later."""
+    scenario, seeds = RANDOM[name], np.arange(ROWS)
+    simulator, rng = Simulator(scenario, ROWS, preview), np.random.default_rng(4)
+    begun = np.ones(ROWS, dtype=bool)
+    for _ in range(100):
+        seeds[begun] += 100
+        simulator.reset(begun, [seeding.np_random(int(seed))[0] for seed in seeds])
+        out = simulator.step(rng.uniform(-0.1, 0.1, (ROWS, scenario.joints)))
+        for row in range(0, ROWS, 4):
+            nominal = scenario.nominal(int(seeds[row]), simulator.preview)
+            ahead = simulator.steps_made[row] + np.array(simulator.preview)
+            np.testing.assert_array_equal(out.nominal[row], nominal[ahead])
+        begun = (simulator.steps_made == scenario.steps) | (rng.random(ROWS) < 0.02)
 
 
 @pytest.mark.parametrize("name", ["panda-random", "varga7-random"])
@@ -126,10 +115,12 @@ ENVS = [
     for make in (ikgym.RedundantIKEnv, functools.partial(ikgym.RedundantIKVectorEnv, 3))
     for scenario in ("varga7-random", "panda-random", limited(), panda(ALL))
 ]
+TASK = ikgym.rl.Task("learning-camera", history=2, commands=2)
+LEARNERS = [functools.partial(ikgym.rl.LearningEnv, TASK), functools.partial(ikgym.rl.LearningVectorEnv, 3, TASK)]
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-@pytest.mark.parametrize("make", ENVS)
+@pytest.mark.parametrize("make", [*ENVS, *LEARNERS])
 def test_copies_go_on_by_themselves(make, duplicate):
     """A copy whose kernel still saw the arrays of the first would step it instead."""
     env, twin = make(), make()
@@ -138,10 +129,10 @@ def test_copies_go_on_by_themselves(make, duplicate):
         e.reset(seed=3)
         e.step(actions)
     copied = duplicate(env)
-    got = [copied.step(k * actions)[0]["q"] for k in (1, 2, 3)]
-    wanted = [twin.step(k * actions)[0]["q"] for k in (1, 2, 3)]
-    np.testing.assert_array_equal(got, wanted)
-    np.testing.assert_array_equal(env.step(actions)[0]["q"], wanted[0])
+    got = [copied.step(k * actions) for k in (1, 2, 3)]
+    wanted = [twin.step(k * actions) for k in (1, 2, 3)]
+    assert identical(got, wanted)
+    assert identical(env.step(actions), wanted[0])
 
 
 @pytest.mark.parametrize("make", ENVS)

@@ -8,25 +8,19 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import ikgym
 from ikgym.exceptions import InvalidInputError, ResetNeededError
-from tests.comparison import identical
+from tests.comparison import played_alike, random_actions
 from tests.every_scenario import every_scenario
 from tests.limited import limited
+from tests.plant.effects import PLANTS, panda
 
 N = 3
 NOISE = ikgym.Plant(bias=0.1, noise=0.3)
 
 
-def pair(scenario, mode, preview=2, num_envs=N):
-    native = gym.make_vec("RedundantIK-v0", num_envs=num_envs, scenario=scenario, preview=preview, autoreset_mode=mode)
-    sync = gym.make_vec(
-        "RedundantIK-v0",
-        num_envs=num_envs,
-        scenario=scenario,
-        preview=preview,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": mode},
-    )
-    return native, sync
+def make(scenario, mode, vectorization="vector_entry_point", **options):
+    kwargs = {"vector_kwargs": {"autoreset_mode": mode}} if vectorization == "sync" else {"autoreset_mode": mode}
+    kwargs |= {"scenario": scenario, "vectorization_mode": vectorization, **options}
+    return gym.make_vec("RedundantIK-v0", num_envs=N, **kwargs)
 
 
 def short(name, steps=7):
@@ -34,56 +28,48 @@ def short(name, steps=7):
     return scenario.replace(steps=max(steps, int(np.max(scenario.plant.command_delay))))
 
 
-def noisy(name, steps=7):
-    return short(name, steps).replace(plant=NOISE)
-
-
 EPISODES = [
     *every_scenario(short),
     *(
         pytest.param(one, id=f"{one.name}-{one.steps}-{one.plant.noise}")
-        for one in (noisy("varga7-random"), short("khan8-q1", 130), limited(), limited(plant=NOISE))
+        for one in (
+            short("varga7-random").replace(plant=NOISE),
+            short("khan8-q1", 130),
+            limited(),
+            limited(plant=NOISE),
+        )
+    ),
+]
+#: Scenarios, options and modes; those of the slow run differ in what an episode is alone.
+CASES = [
+    *(
+        pytest.param(*one.values, {"preview": (1, 3, 8)}, mode, id=f"{one.id}-{mode.value}", marks=one.marks)
+        for one in EPISODES
+        for mode in AutoresetMode
+        if not one.marks or mode is AutoresetMode.NEXT_STEP
+    ),
+    *(
+        pytest.param(panda(plant, steps=7), {"commands": 2}, mode, id=f"{name}-{mode.value}")
+        for name, plant in PLANTS.items()
+        for mode in AutoresetMode
+        if name in ("context", "all") or mode is AutoresetMode.SAME_STEP
     ),
 ]
 
 
-@pytest.mark.parametrize(
-    ("scenario", "mode"),
-    [
-        pytest.param(*one.values, mode, id=f"{one.id}-{mode.value}", marks=one.marks)
-        for one in EPISODES
-        for mode in AutoresetMode
-        if not one.marks or mode is AutoresetMode.NEXT_STEP  # those of the slow run differ in what an episode is alone
-    ],
-)
-def test_bit_identical_to_sync_over_whole_episodes(scenario, mode):
-    native, sync = pair(scenario, mode, preview=(1, 3, 8))
-    assert native.metadata["autoreset_mode"] is mode
-    assert native.observation_space == sync.observation_space
-    assert native.action_space == sync.action_space
-    assert native.single_observation_space == sync.single_observation_space
-    rng = np.random.default_rng(1)
-    assert identical(native.reset(seed=11), sync.reset(seed=11))
-    ends, held = 0, np.zeros(3)
-    for _ in range(3 * scenario.steps + 2):
-        actions = rng.uniform(-1.2, 1.2, native.action_space.shape).astype(np.float32)
-        got, wanted = native.step(actions), sync.step(actions)
-        assert identical(got, wanted)
-        assert native.observation_space.contains(got[0])
-        ended = got[3]
-        ends += int(ended.sum())
-        held += got[4].get("at_limit", np.zeros((N, 3))).sum(axis=0)
-        if mode is AutoresetMode.DISABLED and ended.any():
-            native_obs, sync_obs = (envs.reset(options={"reset_mask": ended.copy()}) for envs in (native, sync))
-            assert identical(native_obs, sync_obs)
-    assert ends >= 2 * N
+@pytest.mark.parametrize(("scenario", "options", "mode"), CASES)
+def test_bit_identical_to_sync_over_whole_episodes(scenario, options, mode):
+    native, sync = (make(scenario, mode, kind, **options) for kind in ("vector_entry_point", "sync"))
+    returned = played_alike(native, sync, random_actions(native, 3 * scenario.steps + 2))
+    assert sum(truncated.sum() for *_, truncated, _ in returned) >= 2 * N
+    held = sum(infos.get("at_limit", np.zeros((N, 3))).sum(axis=0) for *_, infos in returned)
     assert (held > 0).all() if scenario.name == limited().name else held.any() <= scenario.arm.limited
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
 def test_record_episode_statistics(mode):
     steps = 5
-    envs = RecordEpisodeStatistics(pair(short("varga7-fast", steps), mode)[0])
+    envs = RecordEpisodeStatistics(make(short("varga7-fast", steps), mode))
     envs.reset(seed=0)
     returns = np.zeros(N)
     for _ in range(steps):
@@ -99,7 +85,7 @@ def test_record_episode_statistics(mode):
 
 
 def test_ignored_actions_may_be_anything_but_others_may_not():
-    native, _ = pair(short("varga7-fast", 2), AutoresetMode.NEXT_STEP)
+    native = make(short("varga7-fast", 2), AutoresetMode.NEXT_STEP)
     native.reset(seed=0)
     bad = np.zeros((N, 7), dtype=np.float32)
     bad[1, 2] = np.nan
@@ -117,7 +103,7 @@ def test_ignored_actions_may_be_anything_but_others_may_not():
 
 
 def test_step_needs_episodes():
-    native, _ = pair(short("varga7-fast", 2), AutoresetMode.DISABLED)
+    native = make(short("varga7-fast", 2), AutoresetMode.DISABLED)
     actions = np.zeros((N, 7), dtype=np.float32)
     with pytest.raises(ResetNeededError, match="call reset"):
         native.step(actions)

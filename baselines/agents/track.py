@@ -11,7 +11,8 @@ import numpy as np
 from baselines.agents.network import Network
 from baselines.agents.processing import Held, Processing
 from baselines.policy import Batch, Problem
-from ikgym.rl.track import middle, steps_ahead
+from ikgym.rl.task import steps_ahead
+from ikgym.rl.track import middle
 from ikgym.rl.track_kernels import track_rows
 from ikgym.rl.twists import twist_size
 from ikgym.validation import FloatArray, number
@@ -19,7 +20,7 @@ from ikgym.validation import FloatArray, number
 
 @dataclasses.dataclass(frozen=True)
 class Track(Processing):
-    """Joint velocities as a share of the largest, from the features of :class:`ikgym.rl.TrackObservation`.
+    """Joint velocities as a share of the largest, from the features of :class:`ikgym.rl.Task`.
 
     Times ahead are in [s], so that an agent trained at 100 Hz sees as far at 1 kHz.
 

@@ -9,7 +9,7 @@ import numpy as np
 from baselines.policy import Problem
 from ikgym.arms import Arm
 from ikgym.kernels.bodies import Shapes
-from ikgym.plant.contact_rows import sweep
+from ikgym.plant.sweep import sweep
 from ikgym.validation import LARGEST, BoolArray, FloatArray
 
 

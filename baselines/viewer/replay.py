@@ -20,7 +20,6 @@ from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.bodies import Surroundings
 from ikgym.obstacles.solids import solids_of
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
@@ -79,11 +78,6 @@ class Stage:
         """The obstacles after so many steps. Shape (o, 16)."""
         now: FloatArray = self.boxes[min(step, len(self.boxes) - 1)]
         return now
-
-    @property
-    def around(self) -> Surroundings | None:
-        """The obstacles as they are at the start, where touching them matters."""
-        return self.scenario.surroundings if self.scenario.collides else None
 
 
 class Replay(NamedTuple):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections import namedtuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +74,10 @@ class Outcome(NamedTuple):
         return cost + self.proximity_cost if self.proximity_cost.size else cost
 
 
+_named: Any = namedtuple  # the types are those of Outcome
+#: Parts of an outcome: those of all scenarios, and those where the plant is not ideal or bodies can touch.
+Shown, More = _named("Shown", Outcome._fields[1:12]), _named("More", Outcome._fields[12:])
+
 #: The observation, see :func:`observation`.
 Observation = dict[str, Floats]
 #: Its keys in all scenarios.
@@ -106,16 +111,12 @@ def outcome(
         late: Whether what is measured may be of an earlier step, so that its age is shown.
     """
     shown = parts(numbers, rows, n, m, p)
-    nothing = numbers[:0].reshape(rows, 0)
+    none = numbers[:0].reshape(rows, 0)
     if h is None:
-        empty = nothing, nothing, nothing.reshape(rows, 0, n)
-        unknown = nothing, nothing, nothing, nothing, nothing.reshape(rows, 0, OBSTACLE)
-        return Outcome._make((numbers, *shown, *empty, shown[0], shown[2], *unknown))
-    *ages, commands, q, pose, clearance, stopped, pair, near, obstacles = more_parts(
-        numbers[rows * size(n, m, p) :], rows, n, m, h, o
-    )
-    measured = (*(ages if late else (nothing, nothing)), commands)
-    return Outcome._make((numbers, *shown, *measured, q, pose, clearance, stopped, pair, near, obstacles))
+        commands, obstacles = none.reshape(rows, 0, n), none.reshape(rows, 0, OBSTACLE)
+        return Outcome._make((numbers, *shown, none, none, commands, shown.q, shown.pose, *4 * [none], obstacles))
+    more = more_parts(numbers[rows * size(n, m, p) :], rows, n, m, h, o)
+    return Outcome._make((numbers, *shown, *(more if late else more._replace(q_age=none, pose_age=none))))
 
 
 def size(n: int, m: int, p: int) -> int:
@@ -128,14 +129,14 @@ def more_size(n: int, m: int, h: int, o: int) -> int:
     return 2 + h * n + n + m + 5 + OBSTACLE * o
 
 
-def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, ...]:
-    """The parts of an outcome up to the joints that are held back, see :func:`outcome`."""
+def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> Any:
+    """The parts :class:`Shown` of a block, see :func:`outcome`."""
     qdot = rows * n
     pose = qdot + rows * n
     nominal = pose + rows * m
     remaining = nominal + rows * p * m
     reward = remaining + rows
-    return (
+    return Shown(
         numbers[:qdot].reshape(rows, n),
         numbers[qdot:pose].reshape(rows, n),
         numbers[pose:nominal].reshape(rows, m),
@@ -150,14 +151,14 @@ def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> tuple[Floats, .
     )
 
 
-def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> tuple[Floats, ...]:
-    """The parts of an outcome that are there where the plant is not ideal or bodies can touch, see :func:`outcome`."""
+def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> Any:
+    """The parts :class:`More` of what is left of a block, see :func:`outcome`."""
     commands = 2 * rows
     true_q = commands + rows * h * n
     true_pose = true_q + rows * n
     clearance = true_pose + rows * m
     obstacles = clearance + 5 * rows
-    return (
+    return More(
         numbers[:rows].reshape(rows, 1),
         numbers[rows:commands].reshape(rows, 1),
         numbers[commands:true_q].reshape(rows, h, n),

@@ -149,20 +149,20 @@ def show_row(constants, cost, state, row, pose, frame, shown):
         pose: Receives the task coordinates. Shape (m,).
         frame: Orientation of the tool and tool point in [m], of shapes (3, 3) and (3,); then what is worked with, of
             shapes (m,) and (e,).
-        shown: The parts of an outcome up to the joints that are held back, written in place.
+        shown: A :class:`ikgym.kernels.outcome.Shown`, written in place.
     """
     kind, point, tables, k = constants.kind, constants.point, state.frames, state.step[row]
     rotation, position, nominal, error = frame
     task_kernels.coordinates(kind, rotation, position, pose)
     frames = tables[row if tables.shape[0] > 1 else 0]
-    _show_nominal(kind, frames, point, k, constants.preview, shown[3][row])
-    shown[4][row, 0] = constants.steps - k
+    _show_nominal(kind, frames, point, k, constants.preview, shown.nominal[row])
+    shown.remaining[row, 0] = constants.steps - k
     target = frames[point[k]]
-    shown[7][row], shown[8][row] = _errors(kind, target, rotation, position)
-    shown[5][row] = shown[6][row] = 0.0
+    shown.position_error[row], shown.orientation_error[row] = _errors(kind, target, rotation, position)
+    shown.tracking_cost[row] = shown.velocity_cost[row] = 0.0
     if constants.counted[k]:
-        shown[5][row] = _tracking(kind, cost, target, pose, nominal, error)
-        shown[6][row] = cost_kernels.velocity(cost, state.qdot[row])
+        shown.tracking_cost[row] = _tracking(kind, cost, target, pose, nominal, error)
+        shown.velocity_cost[row] = cost_kernels.velocity(cost, state.qdot[row])
 
 
 @kernel
@@ -225,23 +225,23 @@ def step(
 @uncounted
 def _rows(chain, constants, cost, state, shown, active, moving, start, stop):
     """The rows of :func:`step`, with the parts of the outcome in a tuple."""
-    q, qdot, m = state.q, state.qdot, shown[2].shape[1]
+    q, qdot, m = state.q, state.qdot, shown.pose.shape[1]
     # Each call has the scratch of its first row to itself.
     rotation, position = state.scratch[start, :9].reshape(3, 3), state.scratch[start, 9:12]
     nominal, error = state.scratch[start, 12 : 12 + m], state.scratch[start, 12 + m :]
     for row in range(start, stop):
         if not active[row]:
             continue
-        shown[9][row] = 0.0
-        shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
+        shown.clipped[row] = 0.0
+        shown.at_limit[row, 0] = shown.at_limit[row, 1] = shown.at_limit[row, 2] = 0.0
         if moving:
-            _move(constants, state, row, shown[9], shown[10])
+            _move(constants, state, row, shown.clipped, shown.at_limit)
             state.step[row] += 1
         for j in range(q.shape[1]):
-            shown[0][row, j] = q[row, j]
-            shown[1][row, j] = qdot[row, j]
+            shown.q[row, j] = q[row, j]
+            shown.qdot[row, j] = qdot[row, j]
         forward(chain, q[row], rotation, position)
-        show_row(constants, cost, state, row, shown[2][row], (rotation, position, nominal, error), shown)
+        show_row(constants, cost, state, row, shown.pose[row], (rotation, position, nominal, error), shown)
 
 
 @inlined

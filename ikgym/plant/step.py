@@ -121,13 +121,13 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown,
     for row in range(start, stop):
         if not active[row]:
             continue
-        shown[9][row] = 0.0
-        shown[10][row, 0] = shown[10][row, 1] = shown[10][row, 2] = 0.0
+        shown.clipped[row] = 0.0
+        shown.at_limit[row, 0] = shown.at_limit[row, 1] = shown.at_limit[row, 2] = 0.0
         if moving:
             if contacts is not None:
                 for j in range(n):
                     contacts.before[row, j] = q[row, j]
-            _drive(constants, drives, state, plant, row, shown[9], shown[10])
+            _drive(constants, drives, state, plant, row, shown.clipped, shown.at_limit)
             state.step[row] += 1
         k = state.step[row]
         loaded = 1 if k >= drives.payload_step else 0
@@ -135,22 +135,29 @@ def _rows(constants, cost, drives, sensors, arms, state, plant, contacts, shown,
             offsets[row, loaded], axes[row, loaded], drives.prismatic, tool[row, loaded], tool_rotation[row, loaded]
         )
         if contacts is not None:
-            _meet(contacts, chain, row, loaded, k, moving, k == drives.payload_step, q, qdot, plant.drive)
+            _meet(contacts, chain, state, plant.drive, row, loaded, moving, k == drives.payload_step)
             _show_contacts(contacts, row, k, constants.counted[k], more)
         else:
-            more[5][row], more[6][row], more[7][row, 0], more[7][row, 1], more[8][row] = math.inf, 0.0, -1.0, -1.0, 0.0
+            more.clearance[row], more.stopped[row], more.pair[row, 0], more.pair[row, 1], more.proximity_cost[row] = (
+                math.inf,
+                0.0,
+                -1.0,
+                -1.0,
+                0.0,
+            )
         forward(chain, q[row], rotation, position)
-        show_row(constants, cost, state, row, more[4][row], (rotation, position, nominal, error), shown)
+        show_row(constants, cost, state, row, more.true_pose[row], (rotation, position, nominal, error), shown)
         for j in range(n):
-            shown[1][row, j] = qdot[row, j]
-            more[3][row, j] = q[row, j]
-        _recall(constants.limits, plant.commands, row, k, more[2])
-        _sense(sensors, plant, constants.kind, row, k, q, rotation, position, shown, more)
+            shown.qdot[row, j] = qdot[row, j]
+            more.true_q[row, j] = q[row, j]
+        _recall(constants.limits, plant.commands, row, k, more.commands)
+        _sense(sensors, plant, constants.kind, state, row, (rotation, position), shown, more)
 
 
 @inlined
-def _meet(contacts, chain, row, loaded, k, moving, loading, q, qdot, drive):
+def _meet(contacts, chain, state, drive, row, loaded, moving, loading):
     """Takes the motion of a row back in which bodies touch, and lets the arm stand still from then on."""
+    q, qdot, k = state.q, state.qdot, state.step[row]
     if not moving:
         measure(contacts, chain, row, loaded, k, q[row])
         return
@@ -172,14 +179,14 @@ def _meet(contacts, chain, row, loaded, k, moving, loading, q, qdot, drive):
 @inlined
 def _show_contacts(contacts, row, k, counted, more):
     """Shows the clearance of a row, what it costs, whether the row is stopped, its nearest pair, and its obstacles."""
-    more[5][row], more[6][row] = contacts.distance[row], contacts.stopped[row]
-    more[8][row] = proximity(contacts.proximity, contacts.distance[row]) if counted else 0.0
+    more.clearance[row], more.stopped[row] = contacts.distance[row], contacts.stopped[row]
+    more.proximity_cost[row] = proximity(contacts.proximity, contacts.distance[row]) if counted else 0.0
     for c in range(2):
-        more[7][row, c] = contacts.pair[row, c]
+        more.pair[row, c] = contacts.pair[row, c]
     table, at = place_of_boxes(contacts, row, k + 1)
     for i in range(contacts.shown):
         for c in range(OBSTACLE):
-            more[9][row, i, c] = contacts.boxes[table, at, i, c]
+            more.obstacles[row, i, c] = contacts.boxes[table, at, i, c]
 
 
 @inlined
@@ -219,13 +226,13 @@ def _recall(limits, commands, row, now, out):
 
 
 @inlined
-def _sense(sensors, plant, kind, row, now, q, rotation, position, shown, more):
+def _sense(sensors, plant, kind, state, row, frame, shown, more):
     """Shows what the sensors do. The pose in the scratch is blurred for it, after all else is done with it."""
-    keys = plant.keys[row]
-    more[0][row, 0] = measure_q(sensors, keys, row, now, q, plant.q, shown[0])
+    now, (rotation, position) = state.step[row], frame
+    more.q_age[row, 0] = measure_q(sensors, plant.keys[row], row, now, state.q, plant.q, shown.q)
     arrived = measure_pose(sensors, plant, row, kind, now, rotation, position)
     if arrived >= 0:
         plant.shown_step[row] = arrived
-    more[1][row, 0] = now - plant.shown_step[row]
+    more.pose_age[row, 0] = now - plant.shown_step[row]
     for i in range(plant.shown.shape[1]):
-        shown[2][row, i] = plant.shown[row, i]
+        shown.pose[row, i] = plant.shown[row, i]

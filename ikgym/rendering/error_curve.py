@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from ikgym.rendering.style import MEDIUM, MIST, SMALL, stride, thinned
+from ikgym.rendering.style import MEDIUM, MIST, SMALL, thinned
 from ikgym.validation import FloatArray
 
 SMALLEST, LARGEST = 1e-9, 1e99  # errors are clipped to this range, in [m] or [rad]
@@ -40,8 +40,11 @@ class ErrorCurve:
         self._axes.set(xlim=(0.0, duration), ylim=(1e-2, 1.0))
         self._axes.tick_params(labelbottom=self._last, labelleft=False)
 
-    def show(self, time: FloatArray, error: FloatArray, steps: int) -> bool:
-        """Updates the curve by times in [s] and errors in [m] or [rad] so far, (k,); returns whether axes changed."""
+    def show(self, time: FloatArray, error: FloatArray, step: int) -> bool:
+        """Updates the curve by times in [s] and errors in [m] or [rad] so far, (k,); returns whether axes changed.
+
+        A point is drawn for each stretch of so many steps.
+        """
         known = self._decades
         error = error.clip(SMALLEST, LARGEST)
         # An error of 0 at the start would open the axis downwards.
@@ -56,7 +59,7 @@ class ErrorCurve:
                 self._decades = low, high
                 self._axes.set_ylim(10.0**low, 10.0**high)
                 self._axes.tick_params(labelleft=True)
-            times, peaks = _peaks(time, error, stride(steps + 1))
+            times, peaks = _peaks(time, error, step)
             self.line.set_data(times, np.maximum(peaks, 10.0**low))
         else:
             self.line.set_data([], [])

@@ -13,9 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.registry import backend_registry
 from matplotlib.figure import Figure
 
-from ikgym.arms import Arm
-from ikgym.kernels.bodies import Surroundings
 from ikgym.rendering.scene import Scene
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 logger = logging.getLogger("ikgym")
@@ -25,31 +24,19 @@ INTERVAL = 1.0 / 30.0  # between two pictures in a window, in [s]
 
 
 class Renderer:
-    """Draws the episodes of one environment.
+    """Draws episodes of one arm.
 
     Args:
-        arm: The arm that moves.
+        scenario: Their scenario.
         mode: ``"rgb_array"`` draws in memory, without pyplot; ``"human"`` in a window of pyplot, or invisibly in
             memory where the backend has no windows.
-        title: Title of the picture.
-        has_orientation: Whether there is an orientation error to show.
+        title: Title of the picture, by default the name of the scenario.
         width: Of the picture in [px], a multiple of 4; it is half as high, and all in it grows with it.
-        surroundings: The obstacles as they are at the start; None if neither they nor bodies are shown.
     """
 
-    def __init__(
-        self,
-        arm: Arm,
-        mode: str,
-        *,
-        title: str,
-        has_orientation: bool,
-        width: int = WIDTH,
-        surroundings: Surroundings | None = None,
-    ) -> None:
-        self._arm, self._human, self._dpi = arm, mode == "human", DPI * width / WIDTH
-        self._title, self._has_orientation, self._surroundings = title, has_orientation, surroundings
-        self._boxes: FloatArray | None = None
+    def __init__(self, scenario: Scenario, mode: str, *, title: str | None = None, width: int = WIDTH) -> None:
+        self._scenario, self._human, self._dpi = scenario, mode == "human", DPI * width / WIDTH
+        self._title = scenario.name if title is None else title
         self._scene: Scene | None = None
         self._in_window = False
         self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in the episode's own
@@ -63,42 +50,29 @@ class Renderer:
         """The figure; None before the first picture, and after :meth:`close`."""
         return None if self._scene is None else self._scene.figure
 
-    def begin(self, nominal_positions: FloatArray, duration: float) -> None:
-        """Begins an episode and forgets the one before.
-
-        Args:
-            nominal_positions: Nominal tool points, one row a step, in [m]. Shape (steps + 1, 3).
-            duration: Of the episode, in [s].
-        """
-        self._duration = duration
-        states = len(nominal_positions)
-        self._nominal = nominal_positions.copy()
-        self._q, self._tool = np.empty((states, self._arm.joints)), np.empty((states, 3))
+    def begin(self, nominal: FloatArray) -> None:
+        """Begins an episode with its nominal tool points in [m], one a step, and forgets the one before."""
+        self._nominal, states = nominal.copy(), len(nominal)
+        self._q, self._tool = np.empty((states, self._scenario.joints)), np.empty((states, 3))
         self._time, self._errors = np.empty(states), np.empty((states, 2))
-        self._states = self._tools = 0  # number of known rows
+        self._states, self._step = 0, 0
         self._staged = False  # whether the scene is set for this episode
 
     def add(
-        self,
-        q: FloatArray,
-        position_error: float,
-        orientation_error: float,
-        time: float,
-        boxes: FloatArray | None = None,
+        self, step: int, q: FloatArray, position_error: float, orientation_error: float, boxes: FloatArray | None = None
     ) -> None:
         """Records a state without drawing; at most steps + 1 states an episode.
 
         Args:
+            step: Steps made in the episode.
             q: Joint coordinates in [rad] or [m]. Shape (n,).
             position_error: In [m].
             orientation_error: In [rad]; ignored where the task has no orientation.
-            time: Since the start of the episode, in [s].
             boxes: The obstacles as they are now; None for those at the start. Shape (o, 16).
         """
-        k, self._boxes = self._states, boxes
-        self._q[k] = q
-        self._errors[k] = position_error, orientation_error
-        self._time[k] = time
+        k, self._step, self._boxes = self._states, step, boxes
+        self._rotation, self._tool[k] = self._scenario.arm.forward(q)
+        self._q[k], self._time[k], self._errors[k] = q, step * self._scenario.dt, (position_error, orientation_error)
         self._states = k + 1
 
     def draw(self) -> npt.NDArray[np.uint8] | None:
@@ -114,20 +88,16 @@ class Renderer:
             return None
         if self._scene is None:
             figure = self._window() if self._human else _in_memory(self._dpi)
-            self._scene = Scene(figure, self._arm, self._title, self._has_orientation, self._surroundings)
+            self._scene = Scene(figure, self._scenario, self._title)
             self._staged = False
-        scene, k = self._scene, self._states
-        new = min(self._tools, k - 1)
-        rotations, self._tool[new:k] = self._arm.forward(self._q[new:k])
-        self._tools = k
+        scene, arm, k = self._scene, self._scenario.arm, self._states
         if anew := not self._staged:
-            start = np.vstack([self._arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
-            margin = 0.08 * self._arm.reach(self._q[0])
-            scene.set_stage(self._nominal, start, margin, self._duration, self._boxes)
+            start = np.vstack([arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
+            scene.set_stage(self._nominal, start, 0.08 * arm.reach(self._q[0]), self._boxes)
             self._staged = True
-        scene.set_arm(self._arm.joint_points(self._q[k - 1]), rotations[-1], self._tool[:k], self._nominal)
+        scene.set_arm(arm.joint_points(self._q[k - 1]), self._rotation, self._tool[:k], self._nominal[self._step])
         scene.set_solids(self._q[k - 1], self._boxes)
-        anew |= scene.set_errors(self._time[:k], self._errors[:k], len(self._time) - 1)
+        anew |= scene.set_errors(self._time[:k], self._errors[:k])
         scene.paint(anew=anew)
         if self._human:
             self._shown_at, self._shown = clock.perf_counter(), self._time[k - 1]

@@ -16,8 +16,6 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import MaxNLocator
 
-from ikgym.arms import Arm
-from ikgym.kernels.bodies import Surroundings
 from ikgym.rendering.error_curve import ErrorCurve
 from ikgym.rendering.solid_lines import SolidLines
 from ikgym.rendering.style import (
@@ -37,6 +35,7 @@ from ikgym.rendering.style import (
     stride,
     thinned,
 )
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: Colours of the tool's axes.
@@ -48,11 +47,10 @@ FRAME = 0.14
 class Scene:
     """The picture and its moving parts, see :class:`ikgym.rendering.Renderer`."""
 
-    def __init__(
-        self, figure: Figure, arm: Arm, title: str, has_orientation: bool, surroundings: Surroundings | None = None
-    ) -> None:
+    def __init__(self, figure: Figure, scenario: Scenario, title: str) -> None:
         self.figure, self._title = figure, title
-        self._prismatic = arm.chain.prismatic
+        self._steps, self._duration = scenario.steps, scenario.steps * scenario.dt
+        self._prismatic, self._has_orientation = scenario.arm.chain.prismatic, scenario.task.has_orientation
         self._background: Any = None
         figure.set_layout_engine("none")
         self._moving: list[Artist] = []
@@ -71,11 +69,10 @@ class Scene:
         self._tool = self._line("tool", ls="", marker="D", ms=5.5, mfc=VERMILION, mec=INK, mew=0.8)
         self._target = self._line("target", ls="", marker="o", ms=11, mfc="none", mec=GREEN, mew=1.6)
         self._frame = [self._line(f"tool {name}", color=colour, lw=2.0) for name, colour in AXES.items()]
-        self._solids = None if surroundings is None else SolidLines(arm, surroundings, self._line)
-        self._clearance = math.inf
-        self._has_orientation, self._frame_length = has_orientation, 0.0
+        self._solids = SolidLines(scenario.arm, scenario.surroundings, self._line) if scenario.collides else None
+        self._clearance, self._frame_length = math.inf, 0.0
         self._base.set_data_3d(np.zeros((3, 1)))
-        self._curves = self._error_curves(has_orientation)
+        self._curves = self._error_curves()
         self._heading = figure.text(0.02, 0.945, "", size=LARGE, weight="bold", parse_math=False)
         self._moving += [*(curve.line for curve in self._curves), self._heading]
         self._legend()
@@ -85,16 +82,13 @@ class Scene:
             # A canvas also draws by itself, when its window is resized or the view turned.
             figure.canvas.mpl_connect("draw_event", self._keep_background)
 
-    def set_stage(
-        self, nominal: FloatArray, start: FloatArray, margin: float, duration: float, boxes: FloatArray | None = None
-    ) -> None:
+    def set_stage(self, nominal: FloatArray, start: FloatArray, margin: float, boxes: FloatArray | None = None) -> None:
         """Sets the parts that are fixed during an episode.
 
         Args:
             nominal: The nominal positions in [m]. Shape (steps + 1, 3).
             start: Points of the arm at the start in [m]. Shape (any, 3).
             margin: Space around base, nominal path and start, in [m].
-            duration: Of the episode, in [s].
             boxes: The obstacles; None for those at the start. Shape (o, 16).
         """
         self._nominal.set_data_3d(thinned(nominal, stride(len(nominal))).T)
@@ -116,19 +110,19 @@ class Scene:
         for axis, a, b in zip((self._space.xaxis, self._space.yaxis, self._space.zaxis), first, last, strict=True):
             axis.set_ticks(distance * np.arange(a, b + 1))
         for curve in self._curves:
-            curve.begin(duration)
+            curve.begin(self._duration)
 
-    def set_arm(self, joints: FloatArray, rotation: FloatArray, tool: FloatArray, nominal: FloatArray) -> None:
+    def set_arm(self, joints: FloatArray, rotation: FloatArray, tool: FloatArray, target: FloatArray) -> None:
         """Moves the arm.
 
         Args:
             joints: The two ends of each joint in [m]. Shape (n, 2, 3).
             rotation: Orientation of the tool. Shape (3, 3).
             tool: The tool points so far in [m]. Shape (k, 3).
-            nominal: The nominal positions in [m]. Shape (steps + 1, 3).
+            target: The nominal position in [m]. Shape (3,).
         """
         links, gap = [np.zeros(3)], np.full(3, np.nan)
-        path = thinned(tool, stride(len(nominal)))
+        path = thinned(tool, stride(self._steps + 1))
         for (begin, end), prismatic in zip(joints, self._prismatic, strict=True):
             links += [begin, gap, end] if prismatic else [end]
         rails = joints[self._prismatic]
@@ -137,7 +131,7 @@ class Scene:
         self._revolute.set_data_3d(joints[~self._prismatic, 1].T)
         self._actual.set_data_3d(path.T)
         self._tool.set_data_3d(path[-1:].T)
-        self._target.set_data_3d(nominal[len(tool) - 1, :, None])
+        self._target.set_data_3d(target[:, None])
         if self._has_orientation:
             for line, axis in zip(self._frame, rotation.T, strict=True):
                 line.set_data_3d(np.vstack([path[-1], path[-1] + self._frame_length * axis]).T)
@@ -147,17 +141,16 @@ class Scene:
         if self._solids is not None:
             self._clearance = self._solids.show(q, boxes)
 
-    def set_errors(self, time: FloatArray, errors: FloatArray, steps: int) -> bool:
+    def set_errors(self, time: FloatArray, errors: FloatArray) -> bool:
         """Moves the error curves on, and the heading; returns whether an axis changed, so that all is drawn anew.
 
         Args:
             time: The times so far in [s]. Shape (k,).
             errors: Errors of position in [m] and of orientation in [rad]. Shape (k, 2).
-            steps: Steps of the episode.
         """
         clearance = f",  clearance {1e3 * self._clearance:.1f} mm" if math.isfinite(self._clearance) else ""
         self._heading.set_text(f"{self._title},  t = {time[-1]:.3f} s{clearance}")
-        changes = [curve.show(time, errors[:, i], steps) for i, curve in enumerate(self._curves)]
+        changes = [curve.show(time, errors[:, i], stride(self._steps + 1)) for i, curve in enumerate(self._curves)]
         return any(changes)
 
     def paint(self, *, anew: bool) -> None:
@@ -200,8 +193,8 @@ class Scene:
             # The only other way to the grid's colour is rcParams, which belong to the user.
             axis._axinfo["grid"].update(color=MIST, linewidth=0.6)
 
-    def _error_curves(self, has_orientation: bool) -> list[ErrorCurve]:
-        kinds = [("position error", "m", BLUE), ("orientation error", "rad", VERMILION)][: 1 + has_orientation]
+    def _error_curves(self) -> list[ErrorCurve]:
+        kinds = [("position error", "m", BLUE), ("orientation error", "rad", VERMILION)][: 1 + self._has_orientation]
         bottom, top, gap = 0.115, 0.93, 0.06
         self.figure.text(0.8175, 0.025, "time [s]", size=MEDIUM, ha="center")
         pitch = (top - bottom + gap) / len(kinds)

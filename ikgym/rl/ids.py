@@ -5,20 +5,15 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import gymnasium as gym
-import numpy as np
-import numpy.typing as npt
 
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import UnexpectedArgumentError, UnknownNameError
-from ikgym.rl.making import Task
-from ikgym.scenarios import Scenario
-
-Features = npt.NDArray[np.float32]
-Action = npt.NDArray[np.float32]
+from ikgym.rl.envs import LearningEnv, LearningVectorEnv
+from ikgym.rl.task import Task
 
 
-class TaskEnv(gym.Env[Features, Action]):
-    """An arm in the wrappers of :mod:`ikgym.rl`; the classes derived from it are the specifications.
+class TaskEnv(LearningEnv):
+    """An environment by its id; the classes derived from it are the specifications.
 
     Args:
         render_mode: None, `"human"` or `"rgb_array"`.
@@ -29,29 +24,27 @@ class TaskEnv(gym.Env[Features, Action]):
         InvalidInputError: A value is refused.
     """
 
-    task: ClassVar[Task]
+    task: Task
     #: Steps of an episode, and the mean return of `dls` with a score of 0.8, of ``python -m benchmarks.yardsticks``.
     steps: ClassVar[int]
     reward_threshold: ClassVar[float]
     metadata: ClassVar[dict[str, Any]] = {**RedundantIKEnv.metadata, "render_fps": 100}  # type: ignore[misc]
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
-        self._env = self._changed(changes).arm(render_mode=render_mode)
-        self.render_mode = render_mode
-        self.observation_space, self.action_space = self._env.observation_space, self._env.action_space
+        super().__init__(self._changed(changes), render_mode)
 
     @classmethod
-    def arms(cls, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> Any:
+    def arms(cls, num_envs: int = 1, **options: Any) -> LearningVectorEnv:
         """N arms, stepped by one kernel; bit for bit a `SyncVectorEnv` of single ones.
 
         Args:
             num_envs: N.
-            render_mode: None or `"rgb_array"`.
-            options: `autoreset_mode` and `max_episode_steps` of :class:`ikgym.RedundantIKVectorEnv`, and changes as
-                for one arm.
+            options: `autoreset_mode`, `render_mode` and `max_episode_steps` of :class:`ikgym.RedundantIKVectorEnv`,
+                and changes as for one arm.
         """
-        own = {name: options.pop(name) for name in ("autoreset_mode", "max_episode_steps") if name in options}
-        return cls._changed(options).arms(num_envs, render_mode=render_mode, **own)
+        known = ("autoreset_mode", "render_mode", "max_episode_steps")
+        own = {name: options.pop(name) for name in known if name in options}
+        return LearningVectorEnv(num_envs, cls._changed(options), **own)
 
     @classmethod
     def _changed(cls, changes: dict[str, Any]) -> Task:
@@ -59,33 +52,6 @@ class TaskEnv(gym.Env[Features, Action]):
             return cls.task.replace(**changes)
         except UnknownNameError as e:
             raise UnexpectedArgumentError(f"got an unexpected keyword argument {e.name!r}. {e}") from None
-
-    @property
-    def scenario(self) -> Scenario:
-        """The tracking problem."""
-        scenario: Scenario = self._env.unwrapped.scenario  # type: ignore[attr-defined]  # of the environment
-        return scenario
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Features, dict[str, Any]]:
-        """Begins an episode; for the options see :class:`ikgym.RedundantIKEnv`."""
-        super().reset(seed=seed)
-        self._env.unwrapped.np_random = self.np_random  # one generator, whoever asks for it
-        return self._env.reset(options=options)
-
-    def step(self, action: Action) -> tuple[Features, float, bool, bool, dict[str, Any]]:
-        """One step; `info` is that of :class:`ikgym.RedundantIKEnv`, whose costs are the benchmark's."""
-        observation, reward, terminated, truncated, info = self._env.step(action)
-        return observation, float(reward), terminated, truncated, info
-
-    def render(self) -> Any:
-        """Draws the arm, see :meth:`ikgym.RedundantIKEnv.render`."""
-        return self._env.render()
-
-    def close(self) -> None:
-        """Closes the window, if there is one."""
-        self._env.close()
 
 
 class ReachEnv(TaskEnv):

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from ikgym.rl.envs import LearningVectorEnv
 from ikgym.rl.ids import IDS, TaskEnv
-from ikgym.rl.making import Task
+from ikgym.rl.task import Task
 from ikgym.validation import FloatArray, float_array, known_name, known_names, whole_number
 
 #: Costs of the yardsticks, by split and id; ``python -m benchmarks.yardsticks`` measures them.
@@ -66,7 +67,7 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
 
 def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
     """The infos of each step of whole episodes, also beyond where training would end them; see :func:`costs`."""
-    envs = task.replace(lost_distance=None).arms(len(seeds), autoreset_mode="Disabled")
+    envs = LearningVectorEnv(len(seeds), task.replace(lost_distance=None), autoreset_mode="Disabled")
     observation, _ = envs.reset(seed=list(seeds))
     state, begun = None, np.ones(len(seeds), dtype=np.bool_)
     for _ in range(envs.scenario.steps):

@@ -1,113 +1,131 @@
-"""The work of the wrappers of the environments by id, on N rows."""
+"""What a learner observes, does and is rewarded with, on N rows; a single environment is one row."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium import spaces
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.rl.stages import Rows, Stage, Told
+from ikgym.rl.task import Task
 from ikgym.rl.track_kernels import MOST, distance_rewards, track_rows
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray, flag, float_array, number, shortened
+from ikgym.validation import BoolArray, FloatArray, shortened
 
 #: Error in [m] below which an agent gains little more: Δx of the cost.
 UNIT = 1e-3
 #: Steps that count as 1 in ages of measurements.
 OLDEST = 10.0
+#: Observations of N rows, or of one without a row axis.
+Features = npt.NDArray[np.float32]
+#: Values of `info` by key, for the steps that are rewarded. Shape (N,).
+Told = Callable[[str], FloatArray]
 
 
-class TrackStage(Stage):
-    """See :class:`ikgym.rl.TrackObservation`."""
+class Learner:
+    """The work of a learning task on N rows.
+
+    Args:
+        task: Its parameters.
+        scenario: Its scenario.
+        preview: Steps ahead at which the reference is shown.
+        space: The observation space of one row of the environment.
+        rows: N, or None for one arm whose actions have no row axis.
+
+    Attributes:
+        observation_space: Space of one row's observation.
+        action_space: Space of one row's action.
+    """
 
     def __init__(
-        self, env: Any, radian: float = 1.0, coarse: float = 0.03, fine: float = 0.01, context: bool = False
+        self, task: Task, scenario: Scenario, preview: Sequence[int], space: Any, rows: int | None = None
     ) -> None:
-        space, scenario = own_space(env), env.unwrapped.scenario
-        sizes = {"radian": radian, "coarse": coarse, "fine": fine}
-        scales = tuple(number(name, size, above=0.0) for name, size in sizes.items())
-        self._fastest = scenario.largest_qdot
-        self._command = scenario.task.kind, scenario.model.chain, scales, *middle(scenario.model), self._fastest
+        kind, self._fastest = scenario.task.kind, scenario.largest_qdot
+        scales = task.radian, task.coarse, task.fine
+        self._command = kind, scenario.model.chain, scales, *middle(scenario.model), self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
-        self._own = 2 * (scenario.joints + len(env.unwrapped.preview) * int(twist_size(scenario.task.kind)))
-        added = spaces.flatdim(spaces.Dict({key: space[key] for key in self._more}))
-        self._env, self._shown = env.unwrapped, flag("context", context)
-        if context and not scenario.plant.context:
-            raise InvalidInputError(f"context: expected a plant with numbers drawn from ranges, got {scenario.plant}.")
-        self._context = self._contexts()
-        self.observation_space = spaces.Box(-MOST, MOST, (self._own + added + self._context.shape[1],), np.float32)
+        self._own = 2 * (scenario.joints + len(preview) * int(twist_size(kind)))
+        self._contexts = len(scenario.plant.context) if task.context else 0
+        size = self._own + spaces.flatdim(spaces.Dict({key: space[key] for key in self._more})) + self._contexts
+        self.observation_space = spaces.Box(-MOST, MOST, (task.history * size,), np.float32)
+        self._history, self._context = np.zeros((rows or 1, task.history, size), np.float32), np.zeros((rows or 1, 0))
+        self._fraction = task.share * self._fastest / scenario.velocity_limit
+        self.action_space = spaces.Box(-1.0, 1.0, self._fraction.shape, np.float32)
+        self._shape = self._fraction.shape if rows is None else (rows, scenario.joints)
+        self._scales = task.radian, UNIT, task.zero
+        self._oriented, self._near = scenario.task.has_orientation, scenario.proximity is not None
 
-    def observation(self, observation: Any, begun: BoolArray) -> Any:
-        """The features. Shape (N, f)."""
-        del begun
-        self._context = self._contexts()
-        return self._features(observation, self._context)
+    def reset(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
+        """The observations after a reset; where no episode has begun, they are those of the last step.
 
-    def _contexts(self) -> FloatArray:
-        """What is shown of the contexts of all rows. Shape (N, c) or (N, 0)."""
-        context = np.atleast_2d(self._env.context)
-        return context.copy() if self._shown else context[:, :0]
+        Args:
+            seen: What the environment shows.
+            context: The contexts of the rows' episodes. Shape (N, c).
+            begun: Rows whose episodes have begun. Shape (N,).
+        """
+        self._context = context[:, : self._contexts].copy()
+        return self._shown(self._features(seen, self._context), begun)
 
-    def _features(self, observation: Any, context: FloatArray) -> Any:
-        rows = len(observation["q"])
-        out = np.empty((rows, self._own))
-        track_rows(*self._command, *(observation[key] for key in ("q", "qdot", "pose", "nominal")), out)
-        parts = [out, *(self._scaled(key, observation[key]).reshape(rows, -1) for key in self._more)]
-        return np.concatenate([*parts, context], axis=1).astype(np.float32)
+    def observe(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
+        """The observations after a step; for the arguments see :meth:`reset`."""
+        self._context = context[:, : self._contexts].copy()
+        features = self._features(seen, self._context)
+        self._history = np.concatenate([features[:, None], self._history[:, :-1]], axis=1)
+        return self._shown(features, begun)
 
-    def last_observations(self, rows: Rows, observations: Sequence[Any]) -> Sequence[Any]:
-        """The features of these rows. Shapes (f,)."""
-        together = {key: np.array([one[key] for one in observations]) for key in observations[0]}
-        return list(self._features(together, self._context[rows]))  # those of the episodes that have ended
+    def last_observations(self, rows: npt.NDArray[np.int64], seen: Sequence[dict[str, FloatArray]]) -> list[Features]:
+        """The last observations of k rows whose next episodes have begun in the same step.
+
+        Args:
+            rows: Their numbers. Shape (k,).
+            seen: What the environment has shown of each.
+        """
+        together = {key: np.array([one[key] for one in seen]) for key in seen[0]}
+        features = self._features(together, self._context[rows])  # those of the episodes that have ended
+        return list(np.concatenate([features, self._history[rows, :-1].reshape(len(rows), -1)], axis=1))
+
+    def actions(self, actions: npt.ArrayLike) -> FloatArray:
+        """Actions as the environment's fractions of the velocity limit.
+
+        Raises:
+            InvalidInputError: They are no numbers of the shape (n,), for N arms (N, n).
+        """
+        raw = np.asarray(actions)
+        if raw.dtype.kind not in "fiub" or raw.shape != self._shape:
+            raise InvalidInputError(f"action: expected numbers of shape {self._shape}, got {shortened(actions)}.")
+        fractions: FloatArray = np.clip(raw.astype(np.float64), -1.0, 1.0) * self._fraction
+        return fractions
+
+    def rewards(self, told: Told) -> FloatArray:
+        """Rewards from the costs and errors of the step. Shape (N,)."""
+        position = told("position_error")
+        orientation = told("orientation_error") if self._oriented else np.zeros(len(position))
+        others = told("velocity_cost") + told("proximity_cost") if self._near else told("velocity_cost")
+        out = np.empty(len(position))
+        distance_rewards(self._scales, position, orientation, others, out)
+        return out
+
+    def _shown(self, features: Features, begun: BoolArray) -> Features:
+        self._history[begun] = features[begun, None]
+        return self._history.reshape(len(self._history), -1).copy()
+
+    def _features(self, seen: dict[str, FloatArray], context: FloatArray) -> Features:
+        """The observations of the moment. Shape (N, f)."""
+        rows = len(context)
+        own = np.empty((rows, self._own))
+        track_rows(*self._command, *(seen[key] for key in ("q", "qdot", "pose", "nominal")), own)
+        more = [self._scaled(key, seen[key]).reshape(rows, -1) for key in self._more]
+        return np.concatenate([own, *more, context], axis=1).astype(np.float32)
 
     def _scaled(self, key: str, value: FloatArray) -> FloatArray:
         """Past commands as shares of the largest joint velocities, ages in units of ten steps."""
         scaled: FloatArray = np.clip(value / (self._fastest if key == "commands" else OLDEST), -MOST, MOST)
         return scaled
-
-
-class ShareStage(Stage):
-    """See :class:`ikgym.rl.ShareAction`."""
-
-    def __init__(self, env: Any, share: float = 1.0) -> None:
-        scenario = env.unwrapped.scenario
-        self._fraction = number("share", share, above=0.0) * scenario.largest_qdot / scenario.velocity_limit
-        self.action_space = spaces.Box(-1.0, 1.0, self._fraction.shape, np.float32)
-
-    def action(self, actions: FloatArray) -> FloatArray:
-        """Fractions of the scenario's velocity limit."""
-        fractions: FloatArray = actions * self._fraction
-        return fractions
-
-
-class DistanceStage(Stage):
-    """See :class:`ikgym.rl.DistanceReward`."""
-
-    def __init__(self, env: Any, radian: float = 1.0, zero: float = 0.1) -> None:
-        self._scales = number("radian", radian, at_least=0.0), UNIT, number("zero", zero, above=0.0)
-        scenario = env.unwrapped.scenario
-        self._oriented, self._near = scenario.task.has_orientation, scenario.proximity is not None
-
-    def reward(self, rewards: FloatArray, told: Told) -> FloatArray:
-        """Rewards 1 − log(1 + (d / 1 mm)² + Φ^U + Φ^C) / log(1 + (D / 1 mm)²)."""
-        out, position = np.empty(len(rewards)), told("position_error")
-        orientation = told("orientation_error") if self._oriented else np.zeros(len(rewards))
-        others = told("velocity_cost") + told("proximity_cost") if self._near else told("velocity_cost")
-        distance_rewards(self._scales, position, orientation, others, out)
-        return out
-
-
-def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
-    """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once."""
-    times = float_array("ahead", ahead)
-    if times.ndim != 1 or not times.size or (np.diff(times, prepend=0.0) <= 0.0).any():
-        raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shortened(ahead)}.")
-    return tuple(dict.fromkeys(max(1, round(time / dt)) for time in times.tolist()))
 
 
 def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
@@ -121,16 +139,3 @@ def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
     units = np.where(limited & np.array(arm.prismatic), 0.5 * (upper - lower), 1.0)
     home = np.clip(0.5 * (lower + upper), arm.lower, arm.upper) if arm.home is None else np.array(arm.home)
     return home, units
-
-
-def own_space(env: Any) -> spaces.Dict:
-    """The observation space of one row of an environment of this package."""
-    if not isinstance(getattr(env.unwrapped, "scenario", None), Scenario):
-        raise InvalidInputError(f"env: expected an environment RedundantIK-v0, single or vector, got {env}.")
-    name = "single_observation_space" if hasattr(env, "single_observation_space") else "observation_space"
-    space, own = getattr(env, name), getattr(env.unwrapped, name)
-    if space != own:
-        got = f"a {type(space).__name__} of shape {space.shape}"
-        raise InvalidInputError(f"env: expected its own observation, wrapped by nothing that changes it, got {got}.")
-    found: spaces.Dict = own
-    return found

@@ -16,7 +16,7 @@ MOST = 5.0
 
 @kernel
 def track_rows(kind, chain, scales, home, units, fastest, q, qdot, pose, nominal, out):
-    """The features row by row, see :class:`ikgym.rl.TrackObservation`.
+    """The features row by row, see :class:`ikgym.rl.Task`.
 
     Args:
         kind: Of task coordinates.
@@ -53,7 +53,7 @@ def track_rows(kind, chain, scales, home, units, fastest, q, qdot, pose, nominal
 
 @kernel
 def distance_rewards(scales, position, orientation, others, out):
-    """Rewards of N rows, see :class:`ikgym.rl.DistanceReward`.
+    """Rewards of N rows, see :class:`ikgym.rl.Task`.
 
     Args:
         scales: Weight of 1 rad in [m], unit of distances and distance without reward in [m].

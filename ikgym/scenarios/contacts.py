@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import OBSTACLE, PLACED
 from ikgym.kernels.bodies.proximity import OFF
 from ikgym.kernels.outcome import Outcome
+from ikgym.kernels.random_numbers import CUT
 from ikgym.plant.contact import Contacts
-from ikgym.plant.contact_rows import contact_rows
 from ikgym.plant.rows import PlantRows
+from ikgym.plant.sweep import drift, sweep
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import Trajectory
 from ikgym.validation import BoolArray, FloatArray
@@ -27,9 +30,32 @@ def plant_rows(scenario: Scenario, rows: int, commands: int) -> PlantRows:
 def contacts_of(scenario: Scenario, rows: int) -> Contacts:
     """Bodies and obstacles of N arms in a scenario with collisions."""
     boxes = np.tile(scenario.obstacle_rows(scenario.steps + 2), (rows if scenario.draws_obstacles else 1, 1, 1, 1))
-    around, travel, shown = scenario.surroundings, scenario.joint_bound(), scenario.obstacles_shown
-    near = OFF if scenario.proximity is None else scenario.proximity.parameters
-    return contact_rows(scenario.arm, scenario.plant, around, boxes, travel, rows, shown, near)
+    arm, plant, travel = scenario.arm, scenario.plant, scenario.joint_bound()
+    shapes, n, obstacles = arm.bodies.shapes, arm.joints, boxes.shape[2]
+    longer = CUT * math.sqrt(3.0) * float(np.max(plant.calibration)) * plant.link
+    return Contacts(
+        links=shapes.links,
+        radii=shapes.radii,
+        sizes=shapes.sizes,
+        pairs=shapes.pairs,
+        sweep=sweep(arm, travel, longer),
+        checked=scenario.surroundings.checked,
+        boxes=boxes,
+        drift=drift(boxes[0], arm.reach(travel)),
+        shown=obstacles if scenario.obstacles_shown else 0,
+        proximity=OFF if scenario.proximity is None else scenario.proximity.parameters,
+        starts=np.tile(shapes.starts, (rows, 2, 1, 1)),
+        ends=np.tile(shapes.ends, (rows, 2, 1, 1)),
+        distance=np.full(rows, np.inf),
+        pair=np.full((rows, 2), -1),
+        stopped=np.zeros(rows, dtype=np.bool_),
+        before=np.zeros((rows, n)),
+        between=np.zeros((rows, n)),
+        joints=np.zeros((rows, n, 6)),
+        placed=np.zeros((rows, len(shapes.links), PLACED)),
+        moving=np.zeros((rows, obstacles, OBSTACLE)),
+        core=np.zeros((rows, 6)),
+    )
 
 
 def draw_obstacles(

@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 
 from ikgym.kernels.bodies import clearance_rows
-from ikgym.plant.contact_rows import drift, sweep
+from ikgym.plant.sweep import drift, sweep
 from ikgym.trajectories import JointSpline
 
 FILE = pathlib.Path(__file__).parent / "golden" / "clear_motions.json"

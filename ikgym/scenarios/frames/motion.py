@@ -49,9 +49,9 @@ class MotionFrames:
         """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
         return self.point % self.shape[1]
 
-    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory]) -> None:
         """Begins new episodes; the arguments are those of `NominalFrames.begin`."""
-        del tables, steps
+        del tables
         self._motions.parameters[rows] = episodes.parameters  # type: ignore[attr-defined]  # JointMotions
         self._first[rows] += self._points
 
@@ -68,11 +68,9 @@ class MotionFrames:
         return positions
 
 
-def frames_of_rows(
-    scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int, count: int
-) -> MotionFrames | NominalFrames:
+def frames_of_rows(scenario: Scenario, rows: int, ahead: tuple[int, ...], count: int) -> MotionFrames | NominalFrames:
     """The nominal frames of N episodes, see the two classes."""
     motions = scenario.trajectory.samples([])
     if isinstance(motions, JointMotions):
         return MotionFrames(scenario, motions, rows, ahead, count)
-    return NominalFrames(scenario, rows, ahead, memory)
+    return NominalFrames(scenario, rows, ahead)

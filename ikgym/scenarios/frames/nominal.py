@@ -1,4 +1,4 @@
-"""The nominal frames of N episodes: whole tables, or blocks of them that are computed on the way."""
+"""The nominal frames of N episodes, in whole tables."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
 
-# Most memory for the nominal frames of all rows, in bytes: of many long episodes only the next frames are kept.
-MEMORY = 2**26
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN = 4
 # Rows whose frames are computed at a time: their intermediate results stay small.
@@ -23,55 +21,45 @@ PIECE = 64
 
 
 class NominalFrames:
-    """The frames that N episodes need soon; where the scenario is fixed they share one table.
+    """All frames of N episodes; where the scenario is fixed they share one table.
 
     Args:
         scenario: The scenario.
         rows: N.
         ahead: Steps ahead that are shown, rising.
-        memory: Most memory for the frames of all rows, in bytes. Those of random episodes that would take more are
-            computed block by block on the way; a block is never shorter than the preview looks ahead.
+
+    Attributes:
+        point: Which point is the target after k steps, and its place in a table. Shape (steps + furthest preview + 1,).
+        shape: Of the tables.
     """
 
-    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int) -> None:
+    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...]) -> None:
         self._scenario = scenario
-        self.point = scenario.points(ahead)
+        self.point = self.slots = scenario.points(ahead)
         width = 12 if scenario.task.has_orientation else 3
-        points = int(self.point[-1]) + 1
-        tables = rows if scenario.random else 1
-        affordable = memory // (8 * width * rows) if scenario.random else points
-        # Rows know all of their points, or two blocks of them: the next one takes the place of the one before.
-        self._block = points if points <= affordable else min(points, max(affordable // 2, ahead[-1]))
-        self.in_blocks = self._block < points
-        self.shape = (tables, self._block * (2 if self.in_blocks else 1), width)
-        self._last_block = self.point[ahead[-1] :] // self._block
+        self.shape = (rows if scenario.random else 1, int(self.point[-1]) + 1, width)
 
     def allocate(self) -> FloatArray:
         """The tables, of :attr:`shape`, when there is memory for them; that of a fixed scenario is filled."""
         tables = np.zeros(self.shape)
-        self._blocks_known = np.zeros(len(tables), dtype=np.int64)
         self._episodes: list[Trajectory] = [self._scenario.trajectory] * len(tables)
         if not self._scenario.random:
-            self._know(tables, np.zeros(1, dtype=np.int64))
+            self.begin(tables, np.zeros(1, dtype=np.int64), self._episodes)
         return tables
 
-    @property
-    def slots(self) -> Integers:
-        """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
-        return self.point % self.shape[1]
-
-    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
-        """Begins new episodes of a random scenario in some rows, entered after some steps. Shapes (k,)."""
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory]) -> None:
+        """Begins new episodes in some rows. Shape (k,)."""
         for row, episode in zip(rows.tolist(), episodes, strict=True):
             self._episodes[row] = episode
-        self._blocks_known[rows] = self.point[steps] // self._block
-        self.look_ahead(tables, rows, steps)
+        points = np.arange(self.shape[1])
 
-    def look_ahead(self, tables: FloatArray, rows: Integers, steps: Integers) -> None:
-        """Sees to it that rows know all frames that they need after so many steps. Shapes (k,)."""
-        last = self._last_block[steps]
-        while len(late := rows[last >= self._blocks_known[rows]]):
-            self._know(tables, late)
+        def work(start: int, stop: int) -> None:
+            for part in range(start, stop, PIECE):
+                some = rows[part : min(part + PIECE, stop)]
+                own = [self._episodes[row] for row in some.tolist()]
+                tables[some] = self._scenario.frames_of(own, np.broadcast_to(points, (len(some), len(points))))
+
+        in_chunks(work, len(rows), GRAIN)
 
     def positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
@@ -79,17 +67,3 @@ class NominalFrames:
         episode = self._episodes[row if self._scenario.random else 0]
         positions: FloatArray = self._scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
         return positions
-
-    def _know(self, tables: FloatArray, rows: Integers) -> None:
-        """Computes the next block of some rows."""
-        first, ahead = self._blocks_known[rows] * self._block, np.arange(self._block)
-
-        def work(start: int, stop: int) -> None:
-            for part in range(start, stop, PIECE):
-                some = slice(part, min(part + PIECE, stop))
-                points = first[some, None] + ahead
-                episodes = [self._episodes[row] for row in rows[some].tolist()]
-                tables[rows[some, None], points % self.shape[1]] = self._scenario.frames_of(episodes, points)
-
-        in_chunks(work, len(rows), GRAIN)
-        self._blocks_known[rows] += 1

@@ -1,0 +1,106 @@
+"""The parameters of a learning task."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.scenarios import Scenario
+from ikgym.validation import Frozen, flag, float_array, number, shortened, whole_number
+
+
+@dataclasses.dataclass(frozen=True)
+class Task(Frozen):
+    """A scenario as a learning task: what is observed, what an action means, and what is rewarded.
+
+    *Actions.* ±1 is a share of the largest joint velocities, those that arm and scenario allow.
+
+    *Observations.* Numbers of size 1, at most 5, of shape (f,), float32, learned from without a model:
+
+    | size | feature |
+    |---|---|
+    | n | joint coordinates from home in [rad], of prismatic joints in half of their ranges |
+    | n | joint velocities last applied, as shares of the largest |
+    | 2 w each | position and orientation error to the reference at each step ahead that is shown, in units of \
+`coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
+    | 1 each | ages of `q` and `pose` in units of ten steps, where sensors are slow or late |
+    | h n | the last h commands, as shares of the largest joint velocities |
+    | c | the context of the episode, from -1 to 1, with `context` |
+
+    Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
+    joint 1, so that a turn of joint 1 changes none of them; from the base frame where joint 1 is prismatic, and for
+    skew coordinates, which are no vector. Without a home joints are seen from the middle of their range, or from 0;
+    half of a range is 1 m where a prismatic joint has none. With a `history` the last observations stand side by side,
+    newest first: where measurements are late or missing, earlier commands and measurements tell where the arm is now.
+    An episode begins with its first observation repeated.
+
+    *Rewards.* Of size 1, from the true errors and the costs of velocities and, where the scenario has it, proximity:
+
+        reward = 1 − log(1 + (d / 1 mm)² + Φ^U + Φ^C) / log(1 + (D / 1 mm)²)
+        d² = (position error)² + (L · orientation error)²
+
+    D is `zero` and L is `radian`. With L = 1 m, Δx = 1 mm and P_X = 2 this is
+    1 − log(1 + stage cost) / log(1 + (D / 1 mm)²). It is negative beyond D.
+
+    Args:
+        scenario: A scenario or its name, see `ikgym.scenarios.find`.
+        ahead: Times ahead at which the reference is shown, in [s], rising; each is at least one step.
+        lost_distance: Position error in [m] at which an episode ends; None for never.
+        history: Number of observations shown side by side, at least 1.
+        commands: h, the number of past commands shown.
+        share: Share of the largest joint velocities that an action of 1 means, above 0.
+        radian: Weight of 1 rad in [m], in observation and reward, above 0.
+        zero: Distance without reward in [m], above 0.
+        coarse: Unit of errors in the observation, in [m], above 0.
+        fine: Unit of the hyperbolic tangent of the same, in [m], above 0.
+        counted: Steps at the end of an episode whose cost is scored; None for all.
+        context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
+
+    Raises:
+        InvalidInputError: A value is refused.
+    """
+
+    scenario: str | Scenario = "learning-track"
+    ahead: tuple[float, ...] = (0.01, 0.05)
+    lost_distance: float | None = 0.1
+    history: int = 1
+    commands: int = 0
+    share: float = 0.6
+    radian: float = 0.3
+    zero: float = 0.1
+    coarse: float = 0.03
+    fine: float = 0.01
+    counted: int | None = None
+    context: bool = False
+
+    def __post_init__(self) -> None:
+        whole_number("history", self.history, at_least=1)
+        flag("context", self.context)
+        for name in ("share", "radian", "zero", "coarse", "fine"):
+            number(name, getattr(self, name), above=0.0)
+
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of :class:`ikgym.RedundantIKEnv`, single or vector.
+
+        Raises:
+            UnknownNameError: There is no such scenario.
+            InvalidInputError: The times ahead are none, or the plant has no context to show.
+        """
+        scenario = scenarios.find(self.scenario)
+        if self.context and not scenario.plant.context:
+            raise InvalidInputError(f"context: expected a plant with numbers drawn from ranges, got {scenario.plant}.")
+        shown = {"preview": steps_ahead(self.ahead, scenario.dt), "commands": self.commands}
+        return {"scenario": scenario, **shown, "lost_distance": self.lost_distance}
+
+
+def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
+    """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once."""
+    times = float_array("ahead", ahead)
+    if times.ndim != 1 or not times.size or (np.diff(times, prepend=0.0) <= 0.0).any():
+        raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shortened(ahead)}.")
+    return tuple(dict.fromkeys(max(1, round(time / dt)) for time in times.tolist()))
