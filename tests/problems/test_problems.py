@@ -42,10 +42,11 @@ def test_shapes_and_units(name):
 
 def test_the_numbers_have_not_changed():
     digest = hashlib.sha256()
-    for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:]):
-        for array in (*problems.waypoints(name), *(problems.trajectory(name, m) for m in problems.published(name))):
+    for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:], *problems.OBSTRUCTED):
+        trajectories = (problems.trajectory(name, method) for method in problems.published(name))
+        for array in (*problems.waypoints(name), problems.boxes(name), *trajectories):
             digest.update(np.rint(1e6 * array).astype(np.int64).tobytes())
-    assert digest.hexdigest()[:12] == "aa878e2b219e"
+    assert digest.hexdigest()[:12] == "72e2c5cc1574"
 
 
 def test_the_first_waypoints_are_where_the_published_starts_are():
