@@ -10,7 +10,7 @@ import numpy as np
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.batch import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, positive
+from ikgym.validation import LARGEST, FloatArray, Positive, frozen_array
 
 # Relative slack of bounds, for rounding.
 SLACK = 1e-12
@@ -33,9 +33,10 @@ class JointSpline(Trajectory):
     """
 
     control: FloatArray
-    duration: float
+    duration: Positive
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         control = frozen_array("control", self.control, (None, None), at_most=LARGEST)
         if len(control) < 6:
             raise InvalidInputError(f"control: expected at least 6 control points, got {len(control)}.")
@@ -43,7 +44,6 @@ class JointSpline(Trajectory):
         if ends.any():
             raise InvalidInputError("control: expected the first three to be the same and the last three, for rest.")
         self._settle(control=control)
-        self._settle_by(positive, "duration")
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""

@@ -6,17 +6,27 @@ import dataclasses
 import functools
 import typing
 from collections.abc import Sequence
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.motions import control_rows
 from ikgym.trajectories.joint_spline import JointSpline, JointSplines
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, frozen_array, number, per_joint, positive, whole_number
+from ikgym.validation import (
+    LARGEST,
+    SMALLEST,
+    FloatArray,
+    Numbers,
+    Positive,
+    float_array,
+    interval,
+    number,
+    per_joint,
+    whole_number,
+)
 
 # Most spans: each draw needs memory for all of them.
 MOST_SPANS = 10_000
@@ -45,38 +55,28 @@ class RandomJointSpline(Trajectory):
         InvalidInputError: A shape is wrong, a number out of its range, or a range the wrong way round.
     """
 
-    lower: FloatArray
-    upper: FloatArray
+    lower: Numbers
+    upper: Numbers
     velocity_limit: FloatArray
     acceleration_limit: FloatArray
-    duration: float
-    spans: int = 8
-    margin: float = 0.1
-    scale: tuple[float, float] = (0.2, 1.0)
+    duration: Positive
+    spans: Annotated[int, functools.partial(whole_number, at_least=3, at_most=MOST_SPANS)] = 8
+    margin: Annotated[float, functools.partial(number, at_least=0.0, at_most=0.99)] = 0.1
+    scale: Annotated[tuple[float, float], functools.partial(interval, least=0.0, most=1.0)] = (0.2, 1.0)
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        lower = frozen_array("lower", self.lower, (None,), at_most=LARGEST)
-        n = len(lower)
-        upper = frozen_array("upper", self.upper, (n,), at_most=LARGEST)
-        if (lower >= upper).any():
-            i = int(np.argmax(lower >= upper))
+        super().__post_init__()
+        n = len(self.lower)
+        float_array("upper", self.upper, (n,))
+        if (wrong := self.lower >= self.upper).any():
+            i = int(np.argmax(wrong))
             raise InvalidInputError(
-                f"lower, upper: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint {i}."
+                f"lower, upper: expected lower < upper, got {self.lower[i]:g} and {self.upper[i]:g} at joint {i}."
             )
-        low, high = frozen_array("scale", self.scale, (2,)).tolist()
-        if not 0.0 <= low <= high <= 1.0:
-            raise InvalidInputError(f"scale: expected a range (low, high) within 0 and 1, got ({low:g}, {high:g}).")
-        self._settle(
-            lower=lower,
-            upper=upper,
-            velocity_limit=_positive("velocity_limit", self.velocity_limit, n),
-            acceleration_limit=_positive("acceleration_limit", self.acceleration_limit, n),
-            duration=positive("duration", self.duration),
-            spans=whole_number("spans", self.spans, at_least=3, at_most=MOST_SPANS),
-            margin=number("margin", self.margin, at_least=0.0, at_most=0.99),
-            scale=(low, high),
-        )
+        for name in ("velocity_limit", "acceleration_limit"):
+            limit = per_joint(name, getattr(self, name), n, at_least=SMALLEST, at_most=LARGEST)
+            self._settle(**{name: limit})
 
     @classmethod
     def within(cls, arm: Arm, duration: float, **parameters: typing.Any) -> Self:
@@ -142,10 +142,3 @@ class RandomJointSpline(Trajectory):
         room = 0.5 * self.margin * (self.upper - self.lower)
         fastest, hardest = usable * step * self.velocity_limit, usable * step**2 * self.acceleration_limit
         return self.lower + room, self.upper - room, fastest, hardest
-
-
-def _positive(name: str, value: npt.ArrayLike, n: int) -> FloatArray:
-    limits = per_joint(name, value, n, at_most=LARGEST)
-    if (limits < SMALLEST).any():
-        raise InvalidInputError(f"{name}: expected numbers above 0, got {limits.tolist()}.")
-    return limits

@@ -54,10 +54,10 @@ OWN = Arm(
 )
 MOTION = Helix([1 / 3, 0, 0], 0.1, 0.2, 3.0)
 OBSTACLES = (
-    Sphere("ball", [1 / 3, -0.0, 1e-300], 1 / 3, MOTION, ("upper", 'the "tool"')),
-    Capsule("bar", [0, 0, 1 / 3], [0.1, 0.2, 0.3], 0.1, Sinusoid(0.1 * np.ones(3)), ("upper",)),
+    Sphere("ball", [1 / 3, -0.0, 1e-300], 1 / 3, motion=MOTION, ignored=("upper", 'the "tool"')),
+    Capsule("bar", [0, 0, 1 / 3], [0.1, 0.2, 0.3], 0.1, motion=Sinusoid(0.1 * np.ones(3)), ignored=("upper",)),
     Box("crate", [1, 2, 3], [1 / 3, 1e-12, 1], Rotation.random(rng=np.random.default_rng(2)).as_matrix()),
-    HalfSpace("größe", [0, 0, -9], [0, 1 / 3, 1], MOTION.replace(radius=1.0), ("upper",)),
+    HalfSpace("größe", [0, 0, -9], [0, 1 / 3, 1], motion=MOTION.replace(radius=1.0), ignored=("upper",)),
 )
 #: A scenario in which nothing has its default.
 WHOLE = Scenario(

@@ -78,8 +78,8 @@ def test_obstacles_at_rest_have_one_row():
 def test_a_moving_obstacle_is_in_the_frame_of_its_motion():
     helix = Helix([0.0, 0, 1], 0.1, 0.2, 3.0)
     line = StraightLine([*np.eye(3).ravel(), 1, 0, 0], [*TURN.ravel(), 1, 2, 0], 1.0, 0.1)
-    box = Box("box", [0.5, 0, 0], [0.1, 0.2, 0.3], np.eye(3), line)
-    ball, bar = BALL.replace(motion=helix), Capsule("bar", [0, 0, 1], [0, 1, 1], 0.1, line)
+    box = Box("box", [0.5, 0, 0], [0.1, 0.2, 0.3], np.eye(3), motion=line)
+    ball, bar = BALL.replace(motion=helix), Capsule("bar", [0, 0, 1], [0, 1, 1], 0.1, motion=line)
     moving = SCENARIO.replace(obstacles=[ball, box, bar, HalfSpace("floor", [0, 0, -0.1], [0, 0, 1])])
     rows, times = moving.obstacle_rows(2000), moving.times(2000)
     places = helix.frames(times, ARM)[:, -3:]

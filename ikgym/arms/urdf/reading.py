@@ -14,9 +14,7 @@ from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
 from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
-from ikgym.arms.urdf.chain import read_chain
-from ikgym.arms.urdf.joint import MOVING, UrdfJoint
-from ikgym.arms.urdf.tips import Tip, likely_tips
+from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chain
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
