@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import math
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -213,6 +214,25 @@ Sizes = Annotated[FloatArray, functools.partial(frozen_array, shape=(3,), at_lea
 #: A rotation matrix, and a range (low, high).
 Rotation = Annotated[FloatArray, rotation_matrix]
 Interval = Annotated[tuple[float, float], interval]
+
+
+@contextlib.contextmanager
+def about(what: object) -> Iterator[None]:
+    """Begins the messages of bad input with what they are about, such as a file."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{what}: {error}") from None
+
+
+def different_texts(name: str, value: Any, count: int | None = None) -> tuple[str, ...]:
+    """A list of different texts, none of them empty, by default of any length."""
+    texts = tuple(value) if isinstance(value, (tuple, list)) else ()
+    good = {one for one in texts if isinstance(one, str) and one}
+    if not isinstance(value, (tuple, list)) or len(good) != len(texts) or count not in (None, len(texts)):
+        many = "different texts" if count is None else f"{count} different texts"
+        raise InvalidInputError(f"{name}: expected {many}, got {shortened(value)}.")
+    return texts
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:

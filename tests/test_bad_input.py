@@ -193,7 +193,7 @@ def around(*obstacles, bodies=BODIES, **changes):
 
 #: What a call refuses, by a word that its message names: values that do not go together, and arguments of methods.
 REFUSED = [
-    *(("Axis", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
+    *(("axes.*unit vector", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
     ("at least one joint", lambda: ikgym.Arm("none", np.zeros((0, 3)), np.zeros((0, 3)))),
     ("prismatic", lambda: TWO.replace(prismatic=(0, 1))),
     ("tool_rotation", lambda: TWO.replace(tool_rotation=np.diag([1, 1, -1]))),
@@ -204,9 +204,9 @@ REFUSED = [
     ("Did you mean 'tool'", lambda: TWO.replace(tools=1)),
     *(("q: expected", lambda x=x: TWO.forward(x)) for x in (0.0, [1.0], [0, np.nan], ["0", "0"], [1j, 0], None)),
     ("link of body 'upper'.*from 0, the base, to 2, the last, got 3", lambda: TWO.replace(bodies=BODIES)),
-    ("bodies of arm", lambda: TWO.replace(bodies=())),
+    ("'two': bodies", lambda: TWO.replace(bodies=())),
     *((word, lambda field=field, x=x: BODIES.replace(**{field: x})) for word, field, x in (
-        ("radius of body 'hand'.*above 0, got -0.1", "radii", (0.1, -0.1)), ("radii", "radii", (0.1,)),
+        ("radii of bodies.*at least 1e-12, got -0.1 as number 1", "radii", (0.1, -0.1)), ("radii", "radii", (0.1,)),
         ("radii.*finite", "radii", (0.1, np.nan)), ("starts.*finite", "starts", np.full((2, 3), np.nan)),
         ("starts.*shape", "starts", np.zeros(6)), ("ends.*shape", "ends", np.zeros((3, 3))), ("links", "links", (1,)),
         ("links", "links", (1, -1)), ("different texts", "names", ("hand", "hand")), ("names", "names", "ab"),
@@ -238,7 +238,7 @@ REFUSED = [
     ("ProximityCost or None", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=0.1)),
     ("cost of at most", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=ikgym.ProximityCost(1, 1e-12, 100))),
     *(("distance", lambda x=x: ikgym.ProximityCost(0.1).value(x)) for x in (np.nan, [np.inf], "a", None)),
-    ("d of arm", lambda: dh(a=[1, 2])),
+    ("'one': d: expected", lambda: dh(a=[1, 2])),
     ("alpha", lambda: dh(alpha=[np.nan])),
     ("row", lambda: dh(a=[], d=[], alpha=[])),
     ("prismatic", lambda: dh(prismatic=(True, True))),

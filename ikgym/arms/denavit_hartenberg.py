@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ikgym.arms.arm import Arm
 from ikgym.arms.home import from_home
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, float_array, known_name
+from ikgym.validation import FloatArray, about, float_array, known_name
 
 CONVENTIONS = ("standard", "modified")
 
@@ -51,13 +51,13 @@ def from_dh(
         UnknownNameError: There is no such convention.
     """
     known_name("Denavit–Hartenberg convention", convention, CONVENTIONS)
-    a = float_array(f"a of arm {name!r}", a, (None,))
-    n = len(a)
-    d = float_array(f"d of arm {name!r}", d, (n,))
-    alpha = float_array(f"alpha of arm {name!r}", alpha, (n,))
-    theta = np.zeros(n) if theta is None else float_array(f"theta of arm {name!r}", theta, (n,))
-    if n == 0:
-        raise InvalidInputError(f"Denavit–Hartenberg table of arm {name!r}: expected at least one row, got none.")
+    with about(f"Denavit–Hartenberg table of arm {name!r}"):
+        a = float_array("a", a, (None,))
+        n = len(a)
+        d, alpha = float_array("d", d, (n,)), float_array("alpha", alpha, (n,))
+        theta = np.zeros(n) if theta is None else float_array("theta", theta, (n,))
+        if n == 0:
+            raise InvalidInputError("expected at least one row, got none.")
 
     frame = np.eye(4)
     axes, points = np.empty((n, 3)), np.empty((n, 3))

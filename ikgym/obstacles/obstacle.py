@@ -12,7 +12,18 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Trajectory
-from ikgym.validation import IDENTITY, Direction, FloatArray, Frozen, Positive, Rotation, Sizes, Vector, shortened
+from ikgym.validation import (
+    IDENTITY,
+    Direction,
+    FloatArray,
+    Frozen,
+    Positive,
+    Rotation,
+    Sizes,
+    Vector,
+    about,
+    shortened,
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,11 +50,9 @@ class Obstacle(Frozen, abc.ABC):
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise InvalidInputError(f"name of an obstacle: expected a text, got {shortened(self.name)}.")
-        try:
+        with about(f"Obstacle {self.name!r}"):
             super().__post_init__()
             self._check()
-        except InvalidInputError as error:
-            raise InvalidInputError(f"Obstacle {self.name!r}: {error}") from None
         self._settle(ignored=tuple(self.ignored))
 
     @property

@@ -62,7 +62,7 @@ def test_replace_changes_a_copy_and_checks_it():
     assert other.name == "longer"
     np.testing.assert_array_equal(other.forward([0, 0])[1] - arm.forward([0, 0])[1], [1.5, 0, 0])
     assert arm.name == "two"
-    with pytest.raises(InvalidInputError, match="tool of arm 'two'"):
+    with pytest.raises(InvalidInputError, match="Arm 'two': tool"):
         arm.replace(tool=[2, 0])
 
 

@@ -18,7 +18,7 @@ from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chai
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, frozen_array, known_name, rotation_matrix
+from ikgym.validation import FloatArray, about, frozen_array, known_name, rotation_matrix
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -83,7 +83,7 @@ def from_urdf(
         MissingDependencyError: Pinocchio is not installed, or for meshes trimesh or SciPy.
     """
     content = read_user_file(path, MAX_BYTES)
-    try:
+    with about(path):
         tree = Tree(content)
         begin, joints = read_chain(tree, base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
@@ -106,8 +106,6 @@ def from_urdf(
         arm = with_bodies(arm, tree, begin, file.parent if meshes else None)
         object.__setattr__(arm, "urdf", UrdfReference(file, base, tip, tool, tool_rotation, meshes))
         return arm
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
 
 
 def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ...]:
@@ -125,13 +123,11 @@ def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ..
         UnknownNameError: There is no link of that name.
     """
     content = read_user_file(path, MAX_BYTES)
-    try:
+    with about(path):
         tree = Tree(content)
         if base is not None:
             known_name("link", base, tree.links)
         return tuple(likely_tips(tree, tree.root if base is None else base))
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
 
 
 def _with_tool(tip: _Home, tool: FloatArray | None, tool_rotation: FloatArray | None) -> _Home:
