@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import math
+import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, Self
@@ -252,11 +253,12 @@ def known_name(kind: str, name: object, available: Iterable[str]) -> None:
 class Frozen:
     """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled.
 
-    Annotations may name a check, as :data:`Positive` does; its result becomes the value of the field.
+    Annotations may name a check, as :data:`Positive` does; its result becomes the value of the field. Texts and fields
+    that are frozen dataclasses themselves are checked for their class.
     """
 
     def __post_init__(self) -> None:
-        for name, (check, optional) in _checks(type(self)).items():
+        for name, (check, optional) in _checks(type(self)).items():  # type: ignore[arg-type]  # a class has a hash
             value = getattr(self, name)
             if value is not None or not optional:
                 self._settle(**{name: check(name, value)})
@@ -284,15 +286,26 @@ class Frozen:
 
 
 @functools.cache
-def _checks(kind: Any) -> dict[str, tuple[Callable[[str, Any], Any], bool]]:
-    """The checks that a class names in its annotations, and whether their fields may be None."""
-    found: dict[str, tuple[Callable[[str, Any], Any], bool]] = {}
-    for name, hint in typing.get_type_hints(kind, include_extras=True).items():
-        parts = typing.get_args(hint)
-        for part in (hint, *parts):
-            for check in getattr(part, "__metadata__", ()):
-                found[name] = check, type(None) in parts
+def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
+    """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
+    hints, found = typing.get_type_hints(kind, include_extras=True), {}
+    for name in (field.name for field in dataclasses.fields(kind) if field.init):
+        hint = hints[name]
+        parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
+        given = [part for part in parts if part is not type(None)]
+        classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
+        if len(classes) == len(given):
+            found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)
+        for check in getattr(given[0], "__metadata__", ()):
+            found[name] = check, len(given) < len(parts)
     return found
+
+
+def _instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
+    if not isinstance(value, kinds):
+        wanted = " or ".join("a text" if kind is str else f"an object of {kind.__name__}" for kind in kinds)
+        raise InvalidInputError(f"{name}: expected {wanted}, got {shortened(value)}.")
+    return value
 
 
 def _rebuild(cls: type[Any], fields: dict[str, Any]) -> Any:

@@ -24,7 +24,6 @@ from ikgym.validation import (
     Rotation,
     Vector,
     about,
-    different_texts,
     float_array,
     frozen_array,
     shortened,
@@ -82,9 +81,7 @@ class Arm(Frozen):
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise InvalidInputError(f"name of an arm: expected a text, got {shortened(self.name)}.")
-        with about(f"Arm {self.name!r}"):
+        with about(f"Arm {shortened(self.name)}"):
             super().__post_init__()
             self._check()
 
@@ -98,14 +95,12 @@ class Arm(Frozen):
         fastest = {"velocity_limit": np.inf, "acceleration_limit": np.inf}
         self._settle(
             prismatic=checks.truth_values("prismatic", self.prismatic, n),
-            joint_names=different_texts("joint_names", self.joint_names or checks.numbered_joints(n), n),
+            joint_names=checks.joint_names("joint_names", self.joint_names, n),
             **{name: checks.limits(name, getattr(self, name), n, free) for name, free in ends.items()},
             **{
                 name: checks.limits(name, getattr(self, name), n, free, positive=True) for name, free in fastest.items()
             },
         )
-        if not isinstance(self.bodies, Bodies):
-            raise InvalidInputError(f"bodies: expected Bodies, got {shortened(self.bodies)}.")
         self.bodies.check(n)
         if (crossed := self.lower >= self.upper).any():
             i = int(np.argmax(crossed))

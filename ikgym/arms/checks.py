@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import LARGEST, UNIT_TOLERANCE, FloatArray, float_array, read_only, shortened
+from ikgym.validation import LARGEST, UNIT_TOLERANCE, FloatArray, different_texts, float_array, read_only, shortened
 
 # Within this of length 1, a vector is a rounded unit vector: three floats cannot come closer in general.
 ROUNDING = 4e-16
@@ -42,6 +42,11 @@ def truth_values(name: str, prismatic: Any, n: int) -> tuple[bool, ...]:
 def numbered_joints(n: int) -> tuple[str, ...]:
     """The default names of joints."""
     return tuple(f"joint_{i + 1}" for i in range(n))
+
+
+def joint_names(name: str, given: Any, n: int) -> tuple[str, ...]:
+    """Names of the joints; none are given by an empty list."""
+    return numbered_joints(n) if isinstance(given, (tuple, list)) and not given else different_texts(name, given, n)
 
 
 def limits(name: str, value: npt.ArrayLike | None, n: int, default: float, *, positive: bool = False) -> FloatArray:

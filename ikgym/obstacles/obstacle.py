@@ -48,9 +48,7 @@ class Obstacle(Frozen, abc.ABC):
     random: typing.ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise InvalidInputError(f"name of an obstacle: expected a text, got {shortened(self.name)}.")
-        with about(f"Obstacle {self.name!r}"):
+        with about(f"Obstacle {shortened(self.name)}"):
             super().__post_init__()
             self._check()
         self._settle(ignored=tuple(self.ignored))
@@ -62,7 +60,9 @@ class Obstacle(Frozen, abc.ABC):
 
     def _check(self) -> None:
         """Checks what fields alone do not show."""
-        if self.motion is not None and (not isinstance(self.motion, Trajectory) or self.motion.random):
+        if not self.name:
+            raise InvalidInputError("name: expected a text, got an empty one.")
+        if self.motion is not None and self.motion.random:
             raise InvalidInputError(f"motion: expected a trajectory that is not random, got {shortened(self.motion)}.")
         if not isinstance(self.ignored, (tuple, list)) or not all(isinstance(one, str) for one in self.ignored):
             raise InvalidInputError(f"ignored: expected a list of names of bodies, got {shortened(self.ignored)}.")

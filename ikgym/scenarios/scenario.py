@@ -23,7 +23,7 @@ from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.surroundings import Surrounded
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of
-from ikgym.validation import LARGEST, FloatArray, Frozen, Positive, frozen_array
+from ikgym.validation import LARGEST, FloatArray, Frozen, Positive, about, frozen_array, shortened
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
@@ -83,10 +83,11 @@ class Scenario(Frozen, Surrounded):
     source: str = ""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        self._settle(model=self.arm if self.model is None else self.model)
+        with about(f"Scenario {shortened(self.name)}"):
+            super().__post_init__()
         checks.check_parts(self._fields())
         n = self.arm.joints
-        self._settle(model=self.arm if self.model is None else self.model)
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
         if self.start is not None:
             self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))

@@ -39,9 +39,9 @@ class RetimedTrajectory(Trajectory):
     rates: Numbers
 
     def __post_init__(self) -> None:
-        if not isinstance(self.trajectory, Trajectory) or self.trajectory.random:
-            raise InvalidInputError(f"trajectory: expected a Trajectory that is not random, got {self.trajectory!r}.")
         super().__post_init__()
+        if self.trajectory.random:
+            raise InvalidInputError(f"trajectory: expected one that is not random, got {self.trajectory!r}.")
         check_count("times", self.times)
         for name in ("progress", "rates"):
             float_array(name, getattr(self, name), self.times.shape)
