@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import typing
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -13,7 +14,9 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE
+from ikgym.kernels.random_numbers import stream
 from ikgym.obstacles.obstacle import Box, Obstacle
+from ikgym.trajectories import Trajectory, joint_paths_of
 from ikgym.validation import FloatArray, Positive, Sizes, Vector, number, whole_number
 
 #: Where boxes are before they are drawn: so far below the base, in [m].
@@ -133,3 +136,51 @@ def _bends(arm: Arm, paths: FloatArray) -> FloatArray:
     ends = np.maximum(np.linalg.norm(arm.bodies.starts, axis=1), np.linalg.norm(arm.bodies.ends, axis=1))
     far = [links[1:link].sum() + end for link, end in zip(arm.bodies.links, ends, strict=True)]
     return np.maximum(far, 1.0)
+
+
+def drawn_rows(
+    arm: Arm,
+    obstacles: Sequence[Obstacle],
+    first: FloatArray,
+    episodes: Sequence[Trajectory],
+    times: FloatArray,
+    generators: Sequence[np.random.Generator],
+) -> FloatArray:
+    """The obstacles at the start of k episodes, from their rows before any is drawn. Shapes (k, o, 16), (o, 16).
+
+    Generators, one an episode, are touched only where an obstacle is drawn; times are those of the steps in [s].
+    """
+    out = np.tile(first, (len(episodes), 1, 1))
+    if not any(one.random for one in obstacles):
+        return out
+    keys = [int(rng.integers(2**63, dtype=np.uint64)) for rng in generators]
+    paths = joint_paths_of(episodes, np.tile(times, (len(episodes), 1)))
+    for i, (one, rows) in enumerate(_with_rows(obstacles)):
+        if isinstance(one, RandomBoxes):
+            own = np.array([stream(np.uint64(key), np.uint64(i)) for key in keys], dtype=np.uint64)
+            out[:, rows] = one.draw(arm, paths, own)
+    return out
+
+
+def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
+    """Obstacles of one episode, none of them random, from their rows of shape (o, 16)."""
+    out: list[Obstacle] = []
+    for one, rows in _with_rows(obstacles):
+        out += one.boxes(numbers[rows]) if isinstance(one, RandomBoxes) else (one,)
+    return tuple(out)
+
+
+def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest and the largest numbers of obstacles in any episode, from those of obstacles that are not drawn."""
+    low, high = low.copy(), high.copy()
+    for one, rows in _with_rows(obstacles):
+        if isinstance(one, RandomBoxes):
+            low[rows], high[rows] = one.bounds()
+    return low, high
+
+
+def _with_rows(obstacles: Sequence[Obstacle]) -> Iterator[tuple[Obstacle, slice]]:
+    at = 0
+    for one in obstacles:
+        yield one, slice(at, at + one.count)
+        at += one.count

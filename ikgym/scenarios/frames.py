@@ -1,15 +1,16 @@
-"""The nominal frames of N episodes: whole tables, or blocks of them that are computed on the way."""
+"""The nominal frames of N episodes: whole tables, blocks computed on the way, or each one when it is needed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.parallel import in_chunks
-from ikgym.scenarios import Scenario
-from ikgym.trajectories import Trajectory
+from ikgym.scenarios.scenario import Scenario
+from ikgym.trajectories import JointMotions, Trajectory
 from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
@@ -93,3 +94,65 @@ class NominalFrames:
 
         in_chunks(work, len(rows), GRAIN)
         self._blocks_known[rows] += 1
+
+
+class MotionFrames:
+    """Tables of frames that :func:`ikgym.kernels.motions.complete` fills in, so that an episode begins in no time.
+
+    Args:
+        scenario: The scenario.
+        motions: Motions that its trajectory draws.
+        rows: N.
+        ahead: Steps ahead that are shown, rising.
+        count: For how many steps frames are computed at once.
+    """
+
+    def __init__(
+        self, scenario: Scenario, motions: JointMotions, rows: int, ahead: tuple[int, ...], count: int
+    ) -> None:
+        self._scenario, self._motions = scenario, motions
+        self.point = scenario.points(ahead)
+        self._points, width = int(self.point[-1]) + 1, 12 if scenario.task.has_orientation else 3
+        # From the target to the furthest that is shown: those of whole episodes would not stay in the cache.
+        self.shape = (rows, ahead[-1] + count, width)
+        self._preview = np.array(ahead, dtype=np.int64)
+
+    def allocate(self) -> FloatArray:
+        """The tables, of :attr:`shape`, when there is memory for them."""
+        rows, slots, _ = self.shape
+        self._motions = self._motions.blank(rows)
+        self._first, self._known = np.zeros(rows, dtype=np.int64), np.full((rows, slots), -1)
+        return np.zeros(self.shape)
+
+    @property
+    def slots(self) -> Integers:
+        """Index of the target after k steps in a table. Shape (steps + furthest preview + 1,)."""
+        return self.point % self.shape[1]
+
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory], steps: Integers) -> None:
+        """Begins new episodes; the arguments are those of `NominalFrames.begin`."""
+        del tables, steps
+        self._motions.parameters[rows] = episodes.parameters  # type: ignore[attr-defined]  # JointMotions
+        self._first[rows] += self._points
+
+    def arguments(self) -> tuple[Any, ...]:
+        """The first arguments of the kernel."""
+        motions, scenario = self._motions, self._scenario
+        shown = motions.parameters, motions.duration, scenario.dt, self._first, self.point, self._preview, self._known
+        return *scenario.model.chain, *shown
+
+    def positions(self, row: int) -> FloatArray:
+        """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
+        point = self.point[: self._scenario.steps + 1]
+        positions: FloatArray = self._scenario.frames(self._motions[row], int(point[-1]) + 1)[point, -3:]
+        return positions
+
+
+def frames_of_rows(
+    scenario: Scenario, rows: int, ahead: tuple[int, ...], memory: int, count: int
+) -> MotionFrames | NominalFrames:
+    """The nominal frames of N episodes, see the two classes."""
+    motions = scenario.trajectory.samples([])
+    if isinstance(motions, JointMotions):
+        return MotionFrames(scenario, motions, rows, ahead, count)
+    return NominalFrames(scenario, rows, ahead, memory)
