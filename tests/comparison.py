@@ -1,5 +1,6 @@
 """Exact comparison of whatever environments return."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -27,3 +28,15 @@ def identical(a: Any, b: Any) -> bool:
     if a.dtype == object:
         return all(identical(x, y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
     return a.tobytes() == b.tobytes()
+
+
+def fields(part: Any) -> Any:
+    """All that a part is made of, in plain values."""
+    if dataclasses.is_dataclass(part):
+        return [
+            type(part).__name__,
+            {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
+        ]
+    if isinstance(part, tuple) and part and dataclasses.is_dataclass(part[0]):
+        return [fields(one) for one in part]
+    return "None" if part is None else part

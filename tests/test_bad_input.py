@@ -1,7 +1,9 @@
-"""Bad input: a table of fields and values made from annotations, and a table of calls that are refused."""
+"""Parts of scenarios: their copies, bad input by a table of fields and values, and by a table of calls."""
 
+import copy
 import dataclasses
 import functools
+import pickle
 import re
 import typing
 
@@ -43,6 +45,7 @@ from ikgym.trajectories import (
 from ikgym.trajectories.orientations import ORIENTATIONS
 from ikgym.trajectories.paths import PATHS
 from ikgym.trajectories.time_laws import TIME_LAWS
+from tests.comparison import fields, identical
 
 FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
 ARM = ikgym.arms.get("panda")
@@ -151,6 +154,19 @@ def test_bad_values_of_fields_are_refused_in_one_line(good):
             assert said, f"{kind} takes {field}={name}"
             assert len(said.splitlines()) == 1
             assert len(said) < 4000
+
+
+@pytest.mark.parametrize("good", GOOD, ids=lambda one: type(one).__name__)
+def test_copies_are_the_same_bit_for_bit_and_never_change(good):
+    given = {name: np.array(value) for name, value in good._fields().items() if isinstance(value, np.ndarray)}
+    own = good.replace(**given)
+    for array in given.values():
+        array[...] = 0.0
+    for other in (own, pickle.loads(pickle.dumps(good)), copy.deepcopy(good)):
+        assert identical(fields(other), fields(good))
+        public = [value for name, value in vars(other).items() if name[0] != "_"]
+        arrays = [one for value in public for one in (value if isinstance(value, tuple) else [value])]
+        assert not any(one.flags.writeable for one in arrays if isinstance(one, np.ndarray))
 
 
 def test_every_kind_of_part_is_in_the_table():

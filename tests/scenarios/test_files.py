@@ -1,6 +1,5 @@
 """Scenarios as files: nothing is lost on the way, and every mistake in a file is named."""
 
-import dataclasses
 import math
 import tomllib
 import typing
@@ -25,7 +24,7 @@ from ikgym.scenarios.toml import document
 from ikgym.trajectories import Helix, PathTrajectory, Quintic, Sinusoid, TimeLaw, Trajectory, paths
 from ikgym.trajectories.orientations import Orientation
 from tests.arms.test_urdf import LIMIT, joint, robot
-from tests.comparison import identical
+from tests.comparison import fields, identical
 from tests.every_scenario import every_scenario
 from tests.test_bad_input import GOOD
 
@@ -100,18 +99,6 @@ WHOLE = Scenario(
     collisions=True,
     proximity=ikgym.ProximityCost(1 / 3, 1e-3, 2.5, 1.5),
 )
-
-
-def fields(part):
-    """All that a part is made of, in plain values."""
-    if dataclasses.is_dataclass(part):
-        return [
-            type(part).__name__,
-            {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
-        ]
-    if isinstance(part, tuple) and part and dataclasses.is_dataclass(part[0]):
-        return [fields(one) for one in part]
-    return "None" if part is None else part
 
 
 @pytest.mark.parametrize("name", every_scenario())
