@@ -20,12 +20,11 @@ from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.registry import Registry
-from ikgym.scenarios import files, obstructed
+from ikgym.scenarios import files, published
 from ikgym.scenarios.durations import duration
 from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.scenario import Scenario
-from ikgym.trajectories import PublishedPath
 from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = [
@@ -196,15 +195,13 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
 
 
 def _published(problem: str) -> Scenario:
-    """One of the random paths of RL-ITG."""
-    steps = 10 * (len(problems.waypoints(problem).positions) - 1)
-    return get("rlitg-random").replace(name=problem, trajectory=PublishedPath(problem, 0.2), steps=steps)
+    return published.scenario(
+        problem, next(get(name) for key, name in published.LIKE.items() if problem.startswith(key))
+    )
 
 
 for _family, _files in FILES.items():
     for _file in _files:
         _registry.register(_file.stem, functools.partial(load, _file), listed=_family not in ("published", "learning"))
-for _name in problems.OBSTRUCTED:
-    _registry.register(_name, functools.partial(obstructed.scenario, _name), listed=False)
-for _name in problems.names("rlitg-random-"):
+for _name in (*problems.OBSTRUCTED, *problems.names("rlitg-random-")):
     _registry.register(_name, functools.partial(_published, _name), listed=False)
