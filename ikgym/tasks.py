@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.registry import Registry
-from ikgym.validation import FloatArray, Frozen, float_array
+from ikgym.validation import FloatArray, Frozen, ending, float_array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        rotation, position = _array("rotation", rotation, (3, 3)), _array("position", position, (3,))
+        rotation, position = ending("rotation", rotation, 3, 3), ending("position", position, 3)
         lead = position.shape[:-1]
         if rotation.shape[:-2] != lead:
             raise InvalidInputError(
@@ -71,10 +71,8 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        nominal, coordinates = (
-            _array("nominal", nominal, (self.size,)),
-            _array("coordinates", coordinates, (self.size,)),
-        )
+        nominal = ending("nominal", nominal, self.size)
+        coordinates = ending("coordinates", coordinates, self.size)
         try:
             nominal, coordinates = np.broadcast_arrays(nominal, coordinates)
         except ValueError:
@@ -103,7 +101,7 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        rotation = _array("rotation", rotation, (3, 3))
+        rotation = ending("rotation", rotation, 3, 3)
         geometric = float_array("jacobian", jacobian)
         lead = rotation.shape[:-2]
         if geometric.shape[:-1] != (*lead, 6):
@@ -142,14 +140,6 @@ class Task(Frozen):
             given = nominal[index], coordinates[index], error[index], task_jacobian[index]
             task_kernels.error_jacobian(self.kind, *given, out[index])
         return out
-
-
-def _array(name: str, value: npt.ArrayLike, tail: tuple[int, ...]) -> FloatArray:
-    array = float_array(name, value)
-    if array.shape[-len(tail) :] != tail:
-        wanted = "(..., " + ", ".join(map(str, tail)) + ")"
-        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
-    return array
 
 
 _registry: Registry[Task] = Registry("task", Task)

@@ -51,7 +51,7 @@ def float_array(
     """
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in "fiub":
+        if raw.dtype.kind not in "fiu":
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -76,6 +76,15 @@ def frozen_array(
 ) -> FloatArray:
     """Like :func:`float_array`, and read-only."""
     return read_only(float_array(name, value, shape, **bounds))
+
+
+def ending(name: str, value: npt.ArrayLike, *tail: int, **bounds: Any) -> FloatArray:
+    """Like :func:`float_array`, of any shape that ends in the given lengths."""
+    array = float_array(name, value, **bounds)
+    if array.shape[-len(tail) :] != tail:
+        wanted = "(..., " + ", ".join(map(str, tail)) + ")"
+        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
+    return array
 
 
 def read_only(array: FloatArray) -> FloatArray:
@@ -171,9 +180,7 @@ def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 
 def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
     """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does. Fresh, of shape (..., 3, 3)."""
-    matrices = float_array(name, value, at_most=LARGEST)
-    if matrices.shape[-2:] != (3, 3):
-        raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")
+    matrices = ending(name, value, 3, 3, at_most=LARGEST)
     rows = matrices.reshape(-1, 3, 3)
     deviations = np.abs(rows @ rows.transpose(0, 2, 1) - IDENTITY).max(axis=(1, 2))
     wrong = (deviations > UNIT_TOLERANCE) | (np.linalg.det(rows) < 0.0)

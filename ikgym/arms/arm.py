@@ -24,6 +24,7 @@ from ikgym.validation import (
     Rotation,
     Vector,
     about,
+    ending,
     float_array,
     frozen_array,
     shortened,
@@ -284,7 +285,5 @@ class Arm(Frozen):
         return float(links + np.abs(prismatic).sum())
 
     def _rows(self, q: npt.ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
-        array = float_array("q", q)
-        if array.ndim == 0 or array.shape[-1] != self.joints:
-            raise InvalidInputError(f"q: expected shape (..., {self.joints}) for arm {self.name!r}, got {array.shape}.")
+        array = ending("q", q, self.joints)
         return array.reshape(-1, self.joints), array.shape[:-1]

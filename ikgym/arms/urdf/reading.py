@@ -18,7 +18,7 @@ from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chai
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, about, frozen_array, known_name, rotation_matrix
+from ikgym.validation import FloatArray, about, flag, frozen_array, known_name, rotation_matrix
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -82,6 +82,7 @@ def from_urdf(
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed, or for meshes trimesh or SciPy.
     """
+    flag("meshes", meshes)
     content = read_user_file(path, MAX_BYTES)
     with about(path):
         tree = Tree(content)
