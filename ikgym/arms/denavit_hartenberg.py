@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
-from ikgym.arms.home import from_home
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, about, float_array, known_name
 
@@ -71,7 +70,15 @@ def from_dh(
         frame = frame @ turn
         if convention == "standard":
             frame = frame @ link
-    return from_home(name, axes, points, prismatic, frame[:3, :3], frame[:3, 3], **fields)
+    return Arm(
+        name,
+        np.diff(points, axis=0, prepend=np.zeros((1, 3))),  # all link frames are parallel to the base at q = 0
+        axes,
+        prismatic,
+        tool=frame[:3, 3] - points[-1],
+        tool_rotation=frame[:3, :3],
+        **fields,
+    )
 
 
 def _screw_z(angle: float, shift: float) -> FloatArray:

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
-from ikgym.arms.home import from_home
 from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
 from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chain
@@ -91,13 +90,13 @@ def from_urdf(
         tool = None if tool is None else frozen_array("tool", tool, (3,))
         tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
         home = _with_tool(_home(joints), tool, tool_rotation)
-        arm = from_home(
+        arm = Arm(
             tree.name if name is None else name,
+            np.diff(home.points, axis=0, prepend=np.zeros((1, 3))),  # all link frames are parallel to the base at q = 0
             home.axes,
-            home.points,
             [joint.kind == "prismatic" for joint in moving],
-            home.rotation,
-            home.position,
+            tool=home.position - home.points[-1],
+            tool_rotation=home.rotation,
             lower=[joint.lower for joint in moving],
             upper=[joint.upper for joint in moving],
             velocity_limit=[joint.velocity for joint in moving],
