@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +14,11 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
 from ikgym.kernels.cost import CostParameters
-from ikgym.validation import FloatArray, Frozen, float_array, number, positive
+from ikgym.validation import FloatArray, Frozen, Positive, float_array, number
 
 #: The exponents of the cost do not exceed it.
 LARGEST_EXPONENT = 100.0
+Exponent = Annotated[float, functools.partial(number, at_least=1.0, at_most=LARGEST_EXPONENT)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,15 +44,11 @@ class TrackingCost(Frozen):
         InvalidInputError: A parameter is not within its bounds.
     """
 
-    delta_x: float = 1e-3
-    p_x: float = 3.0
-    delta_qdot: float = 0.8
-    p_out: float = 4.0
-    p_in: float = 4.0
-
-    def __post_init__(self) -> None:
-        self._settle_by(positive, "delta_x", "delta_qdot")
-        self._settle_by(number, "p_x", "p_out", "p_in", at_least=1.0, at_most=LARGEST_EXPONENT)
+    delta_x: Positive = 1e-3
+    p_x: Exponent = 3.0
+    delta_qdot: Positive = 0.8
+    p_out: Exponent = 4.0
+    p_in: Exponent = 4.0
 
     @property
     def parameters(self) -> CostParameters:
@@ -97,33 +96,12 @@ class TrackingCost(Frozen):
         """
         return self._sum("qdot", qdot, cost_kernels.velocity)
 
-    def tracking_gradient(self, error: npt.ArrayLike) -> FloatArray:
-        """∂Φ^X/∂error. Shapes (..., e)."""
-        return self._map("error", error, cost_kernels.tracking_gradient)
-
-    def tracking_curvature(self, error: npt.ArrayLike) -> FloatArray:
-        """The diagonal of ∂²Φ^X/∂error². Shapes (..., e). At ``|e| = Δx`` that of the inside."""
-        return self._map("error", error, cost_kernels.tracking_curvature)
-
-    def velocity_gradient(self, qdot: npt.ArrayLike) -> FloatArray:
-        """∂Φ^U/∂q̇. Shapes (..., n)."""
-        return self._map("qdot", qdot, cost_kernels.velocity_gradient)
-
-    def velocity_curvature(self, qdot: npt.ArrayLike) -> FloatArray:
-        """The diagonal of ∂²Φ^U/∂q̇². Shapes (..., n). At rest inf if 1 < P_in < 2; at ``|q̇| = Δq̇`` the inside's."""
-        return self._map("qdot", qdot, cost_kernels.velocity_curvature)
-
     def _sum(self, name: str, value: npt.ArrayLike, kernel: Callable[..., float]) -> FloatArray | float:
-        array = _rows(name, value)
+        array = float_array(name, value)
+        if array.ndim == 0 or array.shape[-1] == 0:
+            raise InvalidInputError(f"{name}: expected shape (..., components), got {array.shape}.")
         out = np.array([kernel(self.parameters, row) for row in array.reshape(-1, array.shape[-1])])
         return float(out[0]) if array.ndim == 1 else out.reshape(array.shape[:-1])
-
-    def _map(self, name: str, value: npt.ArrayLike, kernel: Callable[..., None]) -> FloatArray:
-        array = _rows(name, value)
-        out = np.empty_like(array)
-        for row, target in zip(array.reshape(-1, array.shape[-1]), out.reshape(-1, array.shape[-1]), strict=True):
-            kernel(self.parameters, row, target)
-        return out
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,14 +125,10 @@ class ProximityCost(Frozen):
         InvalidInputError: A parameter is not within its bounds.
     """
 
-    clearance: float
-    delta: float = 1e-2
-    p_out: float = 3.0
-    p_in: float = 2.0
-
-    def __post_init__(self) -> None:
-        self._settle_by(positive, "clearance", "delta")
-        self._settle_by(number, "p_out", "p_in", at_least=1.0, at_most=LARGEST_EXPONENT)
+    clearance: Positive
+    delta: Positive = 1e-2
+    p_out: Exponent = 3.0
+    p_in: Exponent = 2.0
 
     @property
     def parameters(self) -> ProximityParameters:
@@ -183,10 +157,3 @@ class ProximityCost(Frozen):
         array = float_array("distance", distance)
         out = np.array([proximity(self.parameters, one) for one in array.ravel().tolist()])
         return float(out[0]) if array.ndim == 0 else out.reshape(array.shape)
-
-
-def _rows(name: str, value: npt.ArrayLike) -> FloatArray:
-    array = float_array(name, value)
-    if array.ndim == 0 or array.shape[-1] == 0:
-        raise InvalidInputError(f"{name}: expected shape (..., components), got {array.shape}.")
-    return array

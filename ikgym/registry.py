@@ -60,12 +60,21 @@ class Registry(Generic[Member]):
         if name not in self:
             raise UnknownNameError(self.kind, name, self.names())
         if name not in self._made:
-            self._made[name] = self._make(name)
+            self._made[name] = self.made(name, self._makers[name])
         return self._made[name]
 
-    def _make(self, name: str) -> Member:
+    def made(self, name: str, make: Callable[[], object]) -> Member:
+        """What a function makes, which need not be registered.
+
+        Args:
+            name: Its name in messages.
+            make: Called without arguments.
+
+        Raises:
+            InvalidInputError: The function fails, or returns something else.
+        """
         try:
-            made = self._makers[name]()
+            made = make()
         except IkgymError:  # says what is wrong
             raise
         except Exception as error:  # whatever the code of others raises

@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.registry import Registry
-from ikgym.validation import FloatArray, Frozen, float_array
+from ikgym.validation import FloatArray, Frozen, ending, float_array, known_name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        rotation, position = _array("rotation", rotation, (3, 3)), _array("position", position, (3,))
+        rotation, position = ending("rotation", rotation, 3, 3), ending("position", position, 3)
         lead = position.shape[:-1]
         if rotation.shape[:-2] != lead:
             raise InvalidInputError(
@@ -71,10 +70,8 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        nominal, coordinates = (
-            _array("nominal", nominal, (self.size,)),
-            _array("coordinates", coordinates, (self.size,)),
-        )
+        nominal = ending("nominal", nominal, self.size)
+        coordinates = ending("coordinates", coordinates, self.size)
         try:
             nominal, coordinates = np.broadcast_arrays(nominal, coordinates)
         except ValueError:
@@ -103,7 +100,7 @@ class Task(Frozen):
         Raises:
             InvalidInputError: A shape is wrong, or a number not finite.
         """
-        rotation = _array("rotation", rotation, (3, 3))
+        rotation = ending("rotation", rotation, 3, 3)
         geometric = float_array("jacobian", jacobian)
         lead = rotation.shape[:-2]
         if geometric.shape[:-1] != (*lead, 6):
@@ -144,16 +141,7 @@ class Task(Frozen):
         return out
 
 
-def _array(name: str, value: npt.ArrayLike, tail: tuple[int, ...]) -> FloatArray:
-    array = float_array(name, value)
-    if array.shape[-len(tail) :] != tail:
-        wanted = "(..., " + ", ".join(map(str, tail)) + ")"
-        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
-    return array
-
-
-_registry: Registry[Task] = Registry("task", Task)
-for _task in (
+_ALL = (
     # x, y, z in [m].
     Task("position", task_kernels.POSITION, size=3, error_size=3, has_orientation=False),
     # (O^A_12, O^A_13, O^A_23, r_1, r_2, r_3), O^A the skew part of the rotation (Varga 2021).
@@ -164,8 +152,8 @@ for _task in (
     Task("pose", task_kernels.POSE, size=12, error_size=6, has_orientation=True),
     # The z axis of the tool and the position; errors of the position and of the direction. Rotation about z is free.
     Task("axis", task_kernels.AXIS, size=6, error_size=5, has_orientation=True),
-):
-    _registry.register(_task.name, lambda task=_task: task)  # type: ignore[misc]
+)
+_BY_NAME = {task.name: task for task in _ALL}
 
 
 def get(name: str) -> Task:
@@ -174,9 +162,10 @@ def get(name: str) -> Task:
     Raises:
         UnknownNameError: There is no such task; the message has the nearest name.
     """
-    return _registry.get(name)
+    known_name("task", name, _BY_NAME)
+    return _BY_NAME[name]
 
 
 def names() -> tuple[str, ...]:
     """The names of all tasks."""
-    return _registry.names()
+    return tuple(_BY_NAME)

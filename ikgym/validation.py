@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import functools
 import math
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Self
+import types
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,12 +30,28 @@ SMALLEST, LARGEST = 1e-12, 1e12
 
 
 def float_array(
-    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
+    name: str,
+    value: npt.ArrayLike,
+    shape: tuple[int | None, ...] | None = None,
+    *,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
 ) -> FloatArray:
-    """A fresh, C-contiguous float64 copy of finite numbers up to an absolute value; None in a shape is any length."""
+    """A fresh, C-contiguous float64 copy of finite numbers.
+
+    Args:
+        name: Name in messages.
+        value: The numbers.
+        shape: Its shape, in which None is any length; any shape by default.
+        at_least: The least number.
+        at_most: The largest absolute value.
+
+    Raises:
+        InvalidInputError: It is no such array.
+    """
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in "fiub":
+        if raw.dtype.kind not in "fiu":
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -43,14 +63,28 @@ def float_array(
         raise InvalidInputError(f"{name}: expected finite numbers, got {shortened(value)}.")
     if at_most < math.inf and (np.abs(array) > at_most).any():
         raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shortened(value)}.")
+    if (array < at_least).any():
+        i = int(np.argmax(array.ravel() < at_least))
+        raise InvalidInputError(
+            f"{name}: expected numbers of at least {at_least:g}, got {array.ravel()[i]:g} as number {i}."
+        )
     return array
 
 
 def frozen_array(
-    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, *, at_most: float = math.inf
+    name: str, value: npt.ArrayLike, shape: tuple[int | None, ...] | None = None, **bounds: Any
 ) -> FloatArray:
     """Like :func:`float_array`, and read-only."""
-    return read_only(float_array(name, value, shape, at_most=at_most))
+    return read_only(float_array(name, value, shape, **bounds))
+
+
+def ending(name: str, value: npt.ArrayLike, *tail: int, **bounds: Any) -> FloatArray:
+    """Like :func:`float_array`, of any shape that ends in the given lengths."""
+    array = float_array(name, value, **bounds)
+    if array.shape[-len(tail) :] != tail:
+        wanted = "(..., " + ", ".join(map(str, tail)) + ")"
+        raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
+    return array
 
 
 def read_only(array: FloatArray) -> FloatArray:
@@ -59,9 +93,9 @@ def read_only(array: FloatArray) -> FloatArray:
     return array
 
 
-def per_joint(name: str, value: npt.ArrayLike, n: int, *, at_most: float = math.inf) -> FloatArray:
-    """One number for all joints, or one a joint, as a read-only array of shape (n,)."""
-    array = frozen_array(name, value, at_most=at_most)
+def per_joint(name: str, value: npt.ArrayLike, n: int, **bounds: Any) -> FloatArray:
+    """One number for all joints, or one a joint, as a read-only array of shape (n,); bounds as in `float_array`."""
+    array = frozen_array(name, value, **bounds)
     return frozen_array(name, array, (n,)) if array.ndim else read_only(np.full(n, array))
 
 
@@ -96,16 +130,6 @@ def number(
     ):
         raise InvalidInputError(f"{name}: expected a finite number{bound}, got {out!r}.")
     return out
-
-
-def signed(name: str, value: float) -> float:
-    """A number of either sign, not beyond :data:`LARGEST`."""
-    return number(name, value, at_least=-LARGEST, at_most=LARGEST)
-
-
-def positive(name: str, value: float) -> float:
-    """A number from :data:`SMALLEST` to :data:`LARGEST`."""
-    return number(name, value, at_least=SMALLEST, at_most=LARGEST)
 
 
 def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = None) -> int:
@@ -156,9 +180,7 @@ def rotation_matrix(name: str, value: npt.ArrayLike) -> FloatArray:
 
 def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
     """Rotation matrices, each made exactly orthogonal as :func:`rotation_matrix` does. Fresh, of shape (..., 3, 3)."""
-    matrices = float_array(name, value, at_most=LARGEST)
-    if matrices.shape[-2:] != (3, 3):
-        raise InvalidInputError(f"{name}: expected shape (..., 3, 3), got {matrices.shape}.")
+    matrices = ending(name, value, 3, 3, at_most=LARGEST)
     rows = matrices.reshape(-1, 3, 3)
     deviations = np.abs(rows @ rows.transpose(0, 2, 1) - IDENTITY).max(axis=(1, 2))
     wrong = (deviations > UNIT_TOLERANCE) | (np.linalg.det(rows) < 0.0)
@@ -170,6 +192,55 @@ def rotation_matrices(name: str, value: npt.ArrayLike) -> FloatArray:
         left, _, right = np.linalg.svd(rows[row])
         rows[row] = left @ right
     return matrices
+
+
+def direction(name: str, value: npt.ArrayLike) -> FloatArray:
+    """A vector of any length above 0, read-only. Shape (3,)."""
+    vector = frozen_array(name, value, (3,), at_most=LARGEST)
+    if not vector.any():
+        raise InvalidInputError(f"{name}: expected a direction, got the zero vector.")
+    return vector
+
+
+def interval(name: str, value: npt.ArrayLike, least: float = -LARGEST, most: float = LARGEST) -> tuple[float, float]:
+    """A range (low, high) within bounds."""
+    low, high = float_array(name, value, (2,)).tolist()
+    if not least <= low <= high <= most:
+        within = f" within {least:g} and {most:g}"
+        raise InvalidInputError(f"{name}: expected a range (low, high){within}, got ({low:g}, {high:g}).")
+    return low, high
+
+
+#: Fields of frozen dataclasses that name their check: a number of either sign, and one from 1e-12 to 1e12.
+Signed = Annotated[float, functools.partial(number, at_least=-LARGEST, at_most=LARGEST)]
+Positive = Annotated[float, functools.partial(number, at_least=SMALLEST, at_most=LARGEST)]
+#: Arrays up to 1e12: of shape (n,); of shape (3,); likewise, but not 0; likewise, all of at least 1e-12.
+Numbers = Annotated[FloatArray, functools.partial(frozen_array, shape=(None,), at_most=LARGEST)]
+Vector = Annotated[FloatArray, functools.partial(frozen_array, shape=(3,), at_most=LARGEST)]
+Direction = Annotated[FloatArray, direction]
+Sizes = Annotated[FloatArray, functools.partial(frozen_array, shape=(3,), at_least=SMALLEST, at_most=LARGEST)]
+#: A rotation matrix, and a range (low, high).
+Rotation = Annotated[FloatArray, rotation_matrix]
+Interval = Annotated[tuple[float, float], interval]
+
+
+@contextlib.contextmanager
+def about(what: object) -> Iterator[None]:
+    """Begins the messages of bad input with what they are about, such as a file."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{what}: {error}") from None
+
+
+def different_texts(name: str, value: Any, count: int | None = None) -> tuple[str, ...]:
+    """A list of different texts, none of them empty, by default of any length."""
+    texts = tuple(value) if isinstance(value, (tuple, list)) else ()
+    good = {one for one in texts if isinstance(one, str) and one}
+    if not isinstance(value, (tuple, list)) or len(good) != len(texts) or count not in (None, len(texts)):
+        many = "different texts" if count is None else f"{count} different texts"
+        raise InvalidInputError(f"{name}: expected {many}, got {shortened(value)}.")
+    return texts
 
 
 def known_names(kind: str, given: Iterable[str], available: Iterable[str]) -> None:
@@ -187,7 +258,17 @@ def known_name(kind: str, name: object, available: Iterable[str]) -> None:
 
 
 class Frozen:
-    """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled."""
+    """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled.
+
+    Annotations may name a check, as :data:`Positive` does; its result becomes the value of the field. Texts and fields
+    that are frozen dataclasses themselves are checked for their class.
+    """
+
+    def __post_init__(self) -> None:
+        for name, (check, optional) in _checks(type(self)).items():  # type: ignore[arg-type]  # a class has a hash
+            value = getattr(self, name)
+            if value is not None or not optional:
+                self._settle(**{name: check(name, value)})
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one.
@@ -204,15 +285,34 @@ class Frozen:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    def _settle_by(self, check: Callable[..., Any], *names: str, **bounds: Any) -> None:
-        """Sets fields to what a check of this module, such as :func:`number`, makes of them."""
-        self._settle(**{name: check(name, getattr(self, name), **bounds) for name in names})
-
     def _fields(self) -> Mapping[str, Any]:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}  # type: ignore[arg-type]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, (type(self), dict(self._fields()))
+
+
+@functools.cache
+def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
+    """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
+    hints, found = typing.get_type_hints(kind, include_extras=True), {}
+    for name in (field.name for field in dataclasses.fields(kind) if field.init):
+        hint = hints[name]
+        parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
+        given = [part for part in parts if part is not type(None)]
+        classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
+        if len(classes) == len(given):
+            found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)
+        for check in getattr(given[0], "__metadata__", ()):
+            found[name] = check, len(given) < len(parts)
+    return found
+
+
+def _instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
+    if not isinstance(value, kinds):
+        wanted = " or ".join("a text" if kind is str else f"an object of {kind.__name__}" for kind in kinds)
+        raise InvalidInputError(f"{name}: expected {wanted}, got {shortened(value)}.")
+    return value
 
 
 def _rebuild(cls: type[Any], fields: dict[str, Any]) -> Any:

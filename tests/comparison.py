@@ -1,5 +1,6 @@
 """Exact comparison of whatever environments return."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -60,3 +61,15 @@ def played_alike(native: Any, sync: Any, actions: Any) -> list[Any]:
         if native.autoreset_mode is AutoresetMode.DISABLED and ended.any():
             assert identical(*(envs.reset(options={"reset_mask": ended.copy()}) for envs in (native, sync)))
     return returned
+
+
+def fields(part: Any) -> Any:
+    """All that a part is made of, in plain values."""
+    if dataclasses.is_dataclass(part):
+        return [
+            type(part).__name__,
+            {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
+        ]
+    if isinstance(part, tuple) and part and dataclasses.is_dataclass(part[0]):
+        return [fields(one) for one in part]
+    return "None" if part is None else part

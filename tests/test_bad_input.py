@@ -1,7 +1,9 @@
-"""Bad input: a table of fields and values made from annotations, and a table of calls that are refused."""
+"""Parts of scenarios: their copies, bad input by a table of fields and values, and by a table of calls."""
 
+import copy
 import dataclasses
 import functools
+import pickle
 import re
 import typing
 
@@ -42,6 +44,7 @@ from ikgym.trajectories import (
 from ikgym.trajectories.orientations import ORIENTATIONS
 from ikgym.trajectories.paths import PATHS
 from ikgym.trajectories.time_laws import TIME_LAWS
+from tests.comparison import fields, identical
 
 FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
 ARM = ikgym.arms.get("panda")
@@ -56,10 +59,10 @@ BOXES = RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2,
 GOOD = (
     ARM,
     BODIES,
-    Sphere("sphere", [1, 0, 0], 0.1, HELIX, ("hand",)),
-    Capsule("capsule", [1, 0, 0], [1, 0, 1], 0.1, HELIX, ("hand",)),
-    Box("box", [1, 0, 0], [0.1, 0.2, 0.3], np.eye(3), HELIX, ("hand",)),
-    HalfSpace("floor", [0, 0, 0], [0, 0, 1], HELIX, ("hand",)),
+    Sphere("sphere", [1, 0, 0], 0.1, motion=HELIX, ignored=("hand",)),
+    Capsule("capsule", [1, 0, 0], [1, 0, 1], 0.1, motion=HELIX, ignored=("hand",)),
+    Box("box", [1, 0, 0], [0.1, 0.2, 0.3], np.eye(3), motion=HELIX, ignored=("hand",)),
+    HalfSpace("floor", [0, 0, 0], [0, 0, 1], motion=HELIX, ignored=("hand",)),
     BOXES,
     ikgym.scenarios.get("panda-line").replace(velocity_limit=np.full(7, 2.0), start=ARM.home, initial_pose=FRAME),
     ikgym.TrackingCost(),
@@ -152,6 +155,19 @@ def test_bad_values_of_fields_are_refused_in_one_line(good):
             assert len(said) < 4000
 
 
+@pytest.mark.parametrize("good", GOOD, ids=lambda one: type(one).__name__)
+def test_copies_are_the_same_bit_for_bit_and_never_change(good):
+    given = {name: np.array(value) for name, value in good._fields().items() if isinstance(value, np.ndarray)}
+    own = good.replace(**given)
+    for array in given.values():
+        array[...] = 0.0
+    for other in (own, pickle.loads(pickle.dumps(good)), copy.deepcopy(good)):
+        assert identical(fields(other), fields(good))
+        public = [value for name, value in vars(other).items() if name[0] != "_"]
+        arrays = [one for value in public for one in (value if isinstance(value, tuple) else [value])]
+        assert not any(one.flags.writeable for one in arrays if isinstance(one, np.ndarray))
+
+
 def test_every_kind_of_part_is_in_the_table():
     kinds = {kind for family in (KINDS, PATHS, TIME_LAWS, ORIENTATIONS, OBSTACLES) for kind in family.values()}
     costs = {ikgym.TrackingCost, ikgym.ProximityCost}
@@ -192,7 +208,7 @@ def around(*obstacles, bodies=BODIES, **changes):
 
 #: What a call refuses, by a word that its message names: values that do not go together, and arguments of methods.
 REFUSED = [
-    *(("Axis", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
+    *(("axes.*unit vector", lambda x=x: TWO.replace(axes=[x, [1, 0, 0]])) for x in ([0, 0, 0], [1, 1, 0])),
     ("at least one joint", lambda: ikgym.Arm("none", np.zeros((0, 3)), np.zeros((0, 3)))),
     ("prismatic", lambda: TWO.replace(prismatic=(0, 1))),
     ("tool_rotation", lambda: TWO.replace(tool_rotation=np.diag([1, 1, -1]))),
@@ -203,9 +219,9 @@ REFUSED = [
     ("Did you mean 'tool'", lambda: TWO.replace(tools=1)),
     *(("q: expected", lambda x=x: TWO.forward(x)) for x in (0.0, [1.0], [0, np.nan], ["0", "0"], [1j, 0], None)),
     ("link of body 'upper'.*from 0, the base, to 2, the last, got 3", lambda: TWO.replace(bodies=BODIES)),
-    ("bodies of arm", lambda: TWO.replace(bodies=())),
+    ("'two': bodies.*Bodies", lambda: TWO.replace(bodies=())),
     *((word, lambda field=field, x=x: BODIES.replace(**{field: x})) for word, field, x in (
-        ("radius of body 'hand'.*above 0, got -0.1", "radii", (0.1, -0.1)), ("radii", "radii", (0.1,)),
+        ("radii of bodies.*at least 1e-12, got -0.1 as number 1", "radii", (0.1, -0.1)), ("radii", "radii", (0.1,)),
         ("radii.*finite", "radii", (0.1, np.nan)), ("starts.*finite", "starts", np.full((2, 3), np.nan)),
         ("starts.*shape", "starts", np.zeros(6)), ("ends.*shape", "ends", np.zeros((3, 3))), ("links", "links", (1,)),
         ("links", "links", (1, -1)), ("different texts", "names", ("hand", "hand")), ("names", "names", "ab"),
@@ -215,12 +231,12 @@ REFUSED = [
     )),
     ("different texts", lambda: BODIES.added("hand", 1, [0, 0, 0], radius=0.1)),
     ("start of body 'new'", lambda: BODIES.added("new", 1, [0, 0], radius=0.1)),
-    ("radius of obstacle 'a'", lambda: Sphere("a", [0, 0, 0], 0.0)),
-    ("size of obstacle 'a'", lambda: Box("a", [0, 0, 0], [1, 0, 1])),
-    ("rotation of obstacle 'a'", lambda: Box("a", [0, 0, 0], [1, 1, 1], np.diag([1, 1, -1]))),
-    ("normal of obstacle 'a'", lambda: HalfSpace("a", [0, 0, 0], [0, 0, 0])),
-    ("name of an obstacle", lambda: Sphere("", [0, 0, 0], 1.0)),
-    ("not random", lambda: Sphere("a", [0, 0, 0], 1.0, SPLINE)),
+    ("'a': radius", lambda: Sphere("a", [0, 0, 0], 0.0)),
+    ("'a': size", lambda: Box("a", [0, 0, 0], [1, 0, 1])),
+    ("'a': rotation", lambda: Box("a", [0, 0, 0], [1, 1, 1], np.diag([1, 1, -1]))),
+    ("'a': normal", lambda: HalfSpace("a", [0, 0, 0], [0, 0, 0])),
+    ("name: expected a text", lambda: Sphere("", [0, 0, 0], 1.0)),
+    ("not random", lambda: Sphere("a", [0, 0, 0], 1.0, motion=SPLINE)),
     ("names of bodies", lambda: Sphere("a", [0, 0, 0], 1.0, ignored="hand")),
     ("'hand' and 'a'.*mm.*`ignored`", lambda: reset(around(Sphere("a", [0.4, 0, 0.5], 0.5, ignored=("upper",))))),
     ("'hand' and 'upper'.*`ignored`", lambda: reset(around(bodies=BODIES.replace(radii=(0.1, 1.0)), collisions=True))),
@@ -234,10 +250,10 @@ REFUSED = [
     ("an arm with bodies, 'panda' has none", lambda: around(bodies=Bodies(), collisions=True)),
     *(("collisions", lambda x=x: around(collisions=x)) for x in (1, "yes", np.nan)),
     ("with collisions, got one without", lambda: PANDA_LINE.replace(proximity=ikgym.ProximityCost(0.1))),
-    ("ProximityCost or None", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=0.1)),
+    ("proximity.*ProximityCost", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=0.1)),
     ("cost of at most", lambda: around(Sphere("a", [9, 0, 0], 0.1), proximity=ikgym.ProximityCost(1, 1e-12, 100))),
     *(("distance", lambda x=x: ikgym.ProximityCost(0.1).value(x)) for x in (np.nan, [np.inf], "a", None)),
-    ("d of arm", lambda: dh(a=[1, 2])),
+    ("'one': d: expected", lambda: dh(a=[1, 2])),
     ("alpha", lambda: dh(alpha=[np.nan])),
     ("row", lambda: dh(a=[], d=[], alpha=[])),
     ("prismatic", lambda: dh(prismatic=(True, True))),
@@ -269,8 +285,8 @@ REFUSED = [
         lambda: paths.SplinePath(STRAIGHT_BACK), lambda: paths.Polyline(STRAIGHT_BACK, 0.1),
     )),
     *((word, lambda field=field, x=x: BOXES.replace(**{field: x})) for word, field, x in (
-        ("count of obstacle", "count", 10**6), ("lower <= upper", "lower", [0, 0, 2]),
-        ("smallest.*above 0", "smallest", [0, 0.1, 0.1]), ("within of obstacle", "within", 0.01),
+        ("'boxes': count", "count", 10**6), ("lower <= upper", "lower", [0, 0, 2]),
+        ("smallest.*at least 1e-12", "smallest", [0, 0.1, 0.1]), ("'boxes': within", "within", 0.01),
     )),
     *((word, lambda field=field, x=x: RETIMED.replace(**{field: x})) for word, field, x in (
         ("rise, got 0", "times", [0, 0]), ("0 s as the first, got 1", "times", [1, 2]), ("from 2 to", "times", [0]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,18 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import kinematics
 from ikgym.kernels.bodies import clearance_rows
 from ikgym.kernels.kinematics import Chain
-from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, rotation_matrix, shortened
+from ikgym.validation import (
+    LARGEST,
+    FloatArray,
+    Frozen,
+    Rotation,
+    Vector,
+    about,
+    ending,
+    float_array,
+    frozen_array,
+    shortened,
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,11 +65,11 @@ class Arm(Frozen):
     """
 
     name: str
-    offsets: FloatArray
-    axes: FloatArray
+    offsets: Annotated[FloatArray, functools.partial(frozen_array, shape=(None, 3), at_most=LARGEST)]
+    axes: Annotated[FloatArray, checks.unit_axes]
     prismatic: Sequence[bool] = ()
-    tool: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(3))
-    tool_rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+    tool: Vector = dataclasses.field(default_factory=lambda: np.zeros(3))
+    tool_rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
     lower: FloatArray = None  # type: ignore[assignment]  # none
     upper: FloatArray = None  # type: ignore[assignment]  # none
     velocity_limit: FloatArray = None  # type: ignore[assignment]  # none
@@ -70,51 +82,39 @@ class Arm(Frozen):
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise InvalidInputError(f"name of an arm: expected a text, got {shortened(self.name)}.")
-        offsets = frozen_array(f"offsets of arm {self.name!r}", self.offsets, (None, 3), at_most=LARGEST)
-        n = len(offsets)
+        with about(f"Arm {shortened(self.name)}"):
+            super().__post_init__()
+            self._check()
+
+    def _check(self) -> None:
+        """Checks what belongs together, and fills in what was left out."""
+        n = len(self.offsets)
         if n == 0:
-            raise InvalidInputError(f"Arm {self.name!r}: expected at least one joint, got none.")
-        axes = checks.unit_axes(
-            self.name, float_array(f"axes of arm {self.name!r}", self.axes, (n, 3), at_most=LARGEST)
-        )
-        prismatic = checks.truth_values(self.name, self.prismatic, n)
-        tool = frozen_array(f"tool of arm {self.name!r}", self.tool, (3,), at_most=LARGEST)
-        tool_rotation = rotation_matrix(f"tool_rotation of arm {self.name!r}", self.tool_rotation)
-        lower = checks.limits(self.name, "lower", self.lower, n, -np.inf)
-        upper = checks.limits(self.name, "upper", self.upper, n, np.inf)
-        fastest = checks.limits(self.name, "velocity_limit", self.velocity_limit, n, np.inf, positive=True)
-        hardest = checks.limits(self.name, "acceleration_limit", self.acceleration_limit, n, np.inf, positive=True)
-        joint_names = checks.joint_names(self.name, self.joint_names, n)
-        if not isinstance(self.bodies, Bodies):
-            raise InvalidInputError(f"bodies of arm {self.name!r}: expected Bodies, got {shortened(self.bodies)}.")
-        self.bodies.check(n)
-        if (lower >= upper).any():
-            i = int(np.argmax(lower >= upper))
-            raise InvalidInputError(
-                f"Limits of arm {self.name!r}: expected lower < upper, got {lower[i]:g} and {upper[i]:g} at joint "
-                f"{joint_names[i]!r}."
-            )
-        chain = Chain(offsets, axes, np.array(prismatic, dtype=np.bool_), tool, tool_rotation)
-        chain.prismatic.flags.writeable = False
+            raise InvalidInputError("expected at least one joint, got none.")
+        float_array("axes", self.axes, (n, 3))
+        ends = {"lower": -np.inf, "upper": np.inf}
+        fastest = {"velocity_limit": np.inf, "acceleration_limit": np.inf}
         self._settle(
-            offsets=offsets,
-            axes=axes,
-            prismatic=prismatic,
-            tool=tool,
-            tool_rotation=tool_rotation,
-            lower=lower,
-            upper=upper,
-            velocity_limit=fastest,
-            acceleration_limit=hardest,
-            joint_names=joint_names,
-            chain=chain,
+            prismatic=checks.truth_values("prismatic", self.prismatic, n),
+            joint_names=checks.joint_names("joint_names", self.joint_names, n),
+            **{name: checks.limits(name, getattr(self, name), n, free) for name, free in ends.items()},
+            **{
+                name: checks.limits(name, getattr(self, name), n, free, positive=True) for name, free in fastest.items()
+            },
         )
+        self.bodies.check(n)
+        if (crossed := self.lower >= self.upper).any():
+            i = int(np.argmax(crossed))
+            raise InvalidInputError(
+                f"limits: expected lower < upper, got {self.lower[i]:g} and {self.upper[i]:g} at joint "
+                f"{self.joint_names[i]!r}."
+            )
+        prismatic = np.array(self.prismatic, dtype=np.bool_)
+        prismatic.flags.writeable = False
+        self._settle(chain=Chain(self.offsets, self.axes, prismatic, self.tool, self.tool_rotation))
         if self.home is not None:
-            home = frozen_array(f"home of arm {self.name!r}", self.home, (n,))
-            self.check_posture("home", home)
-            self._settle(home=home)
+            self._settle(home=frozen_array("home", self.home, (n,)))
+            self.check_posture("home", self.home)
 
     @property
     def joints(self) -> int:
@@ -293,7 +293,5 @@ class Arm(Frozen):
         return float(links + np.abs(prismatic).sum())
 
     def _rows(self, q: npt.ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
-        array = float_array("q", q)
-        if array.ndim == 0 or array.shape[-1] != self.joints:
-            raise InvalidInputError(f"q: expected shape (..., {self.joints}) for arm {self.name!r}, got {array.shape}.")
+        array = ending("q", q, self.joints)
         return array.reshape(-1, self.joints), array.shape[:-1]

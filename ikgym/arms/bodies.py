@@ -14,9 +14,11 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE, Shapes, Surroundings
 from ikgym.validation import (
     LARGEST,
+    SMALLEST,
     FloatArray,
     Frozen,
     IntArray,
+    different_texts,
     float_array,
     frozen_array,
     known_names,
@@ -60,7 +62,7 @@ class Bodies(Frozen):
         links: Numbers of the links. Shape (k,).
         starts: One end of each body in the frame of its link, in [m]. Shape (k, 3).
         ends: The other end, in [m]; the starts if left out. Shape (k, 3).
-        radii: In [m], above 0. Shape (k,).
+        radii: In [m], at least 1e-12. Shape (k,).
         ignored: Pairs of names whose bodies may touch.
 
     The bodies are sorted by link. Lengths are at most 1e12.
@@ -78,16 +80,15 @@ class Bodies(Frozen):
     ignored: Sequence[Sequence[str]] = ()
 
     def __post_init__(self) -> None:
-        names = _names(self.names)
+        names = different_texts("names of bodies", self.names)
+        if len(names) > MOST_BODIES:
+            raise InvalidInputError(f"names of bodies: expected at most {MOST_BODIES}, got {len(names)}.")
         links = [whole_number("links of bodies", link, at_least=0) for link in _listed("links", self.links)]
         starts = _points("starts of bodies", self.starts, len(names))
         ends = starts if self.ends is None else _points("ends of bodies", self.ends, len(names))
-        radii = frozen_array("radii of bodies", self.radii, (len(names),), at_most=LARGEST)
+        radii = frozen_array("radii of bodies", self.radii, (len(names),), at_least=SMALLEST, at_most=LARGEST)
         if len(links) != len(names):
             raise InvalidInputError(f"links of bodies: expected {len(names)} numbers, got {len(links)}.")
-        for name, radius in zip(names, radii.tolist(), strict=True):
-            if radius <= 0.0:
-                raise InvalidInputError(f"radius of body {name!r}: expected a number above 0, got {radius:g}.")
         order = np.argsort(links, kind="stable")
         self._settle(
             names=tuple(names[i] for i in order),
@@ -186,16 +187,6 @@ class Bodies(Frozen):
             meets = [link > 0 and name not in one.ignored for name, link in zip(self.names, self.links, strict=True)]
             checked += [meets] * one.count
         return Surroundings(boxes, np.array(checked, dtype=np.bool_).reshape(len(boxes), len(self)))
-
-
-def _names(given: Any) -> tuple[str, ...]:
-    names = _listed("names", given)
-    if len(names) > MOST_BODIES:
-        raise InvalidInputError(f"names of bodies: expected at most {MOST_BODIES}, got {len(names)}.")
-    texts = {one for one in names if isinstance(one, str) and one}
-    if len(texts) != len(names):
-        raise InvalidInputError(f"names of bodies: expected different texts, got {shortened(given)}.")
-    return names
 
 
 def _points(name: str, given: npt.ArrayLike, count: int) -> FloatArray:

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
-from ikgym.arms.home import from_home
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, float_array, known_name
+from ikgym.validation import FloatArray, about, float_array, known_name
 
 CONVENTIONS = ("standard", "modified")
 
@@ -51,13 +50,13 @@ def from_dh(
         UnknownNameError: There is no such convention.
     """
     known_name("Denavit–Hartenberg convention", convention, CONVENTIONS)
-    a = float_array(f"a of arm {name!r}", a, (None,))
-    n = len(a)
-    d = float_array(f"d of arm {name!r}", d, (n,))
-    alpha = float_array(f"alpha of arm {name!r}", alpha, (n,))
-    theta = np.zeros(n) if theta is None else float_array(f"theta of arm {name!r}", theta, (n,))
-    if n == 0:
-        raise InvalidInputError(f"Denavit–Hartenberg table of arm {name!r}: expected at least one row, got none.")
+    with about(f"Denavit–Hartenberg table of arm {name!r}"):
+        a = float_array("a", a, (None,))
+        n = len(a)
+        d, alpha = float_array("d", d, (n,)), float_array("alpha", alpha, (n,))
+        theta = np.zeros(n) if theta is None else float_array("theta", theta, (n,))
+        if n == 0:
+            raise InvalidInputError("expected at least one row, got none.")
 
     frame = np.eye(4)
     axes, points = np.empty((n, 3)), np.empty((n, 3))
@@ -71,7 +70,15 @@ def from_dh(
         frame = frame @ turn
         if convention == "standard":
             frame = frame @ link
-    return from_home(name, axes, points, prismatic, frame[:3, :3], frame[:3, 3], **fields)
+    return Arm(
+        name,
+        np.diff(points, axis=0, prepend=np.zeros((1, 3))),  # all link frames are parallel to the base at q = 0
+        axes,
+        prismatic,
+        tool=frame[:3, 3] - points[-1],
+        tool_rotation=frame[:3, :3],
+        **fields,
+    )
 
 
 def _screw_z(angle: float, shift: float) -> FloatArray:

@@ -18,7 +18,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kernels.kinematics import Chain, forward_rows, stacked
-from ikgym.validation import BoolArray, FloatArray, float_array, number, rotation_matrices, whole_number
+from ikgym.validation import BoolArray, FloatArray, ending, number, rotation_matrices, whole_number
 
 # 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.
 LENGTH_OF_RADIAN = 0.25
@@ -46,10 +46,10 @@ def inverse(
         whole_number("restarts", restarts, at_least=0),
         np.uint64(whole_number("seed", seed, at_least=0) % 2**64),
     )
-    positions = _with_last("position", position, 3)
+    positions = ending("position", position, 3)
     rotations = np.empty((0, 0)) if rotation is None else rotation_matrices("rotation", rotation)
     if start is not None:
-        starts = _with_last("start", start, arm.joints)
+        starts = ending("start", start, arm.joints)
         arm.check_posture("start", starts)
     lead = _lead(rotations.shape, positions.shape, starts.shape)
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
@@ -99,13 +99,6 @@ def _search(arm: Any) -> tuple[Ranges, float, FloatArray]:
     last = np.where(finite_upper, arm.upper, first + span)
     start = 0.5 * (first + last) if arm.home is None else arm.home
     return Ranges(arm.lower, arm.upper, first, last), LENGTH_OF_RADIAN * size, start
-
-
-def _with_last(name: str, value: npt.ArrayLike, length: int) -> FloatArray:
-    array = float_array(name, value)
-    if array.ndim == 0 or array.shape[-1] != length:
-        raise InvalidInputError(f"{name}: expected shape (..., {length}), got {array.shape}.")
-    return array
 
 
 def _lead(rotation: tuple[int, ...], position: tuple[int, ...], start: tuple[int, ...]) -> tuple[int, ...]:

@@ -27,12 +27,8 @@ def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
             f"velocity_limit: expected a number, or one a joint, since arm {arm.name!r} has no velocity limit of its "
             f"own at joint {', '.join(without)}."
         )
-    scale = per_joint("velocity_limit", arm.velocity_limit if given is None else given, arm.joints, at_most=LARGEST)
-    if (scale < SMALLEST).any():
-        raise InvalidInputError(
-            f"velocity_limit: expected numbers above 0, at least {SMALLEST:g}, got {scale.tolist()}."
-        )
-    return scale
+    limit = arm.velocity_limit if given is None else given
+    return per_joint("velocity_limit", limit, arm.joints, at_least=SMALLEST, at_most=LARGEST)
 
 
 def farthest(arm: Arm) -> FloatArray:

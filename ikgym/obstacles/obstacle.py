@@ -12,19 +12,46 @@ import numpy as np
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Trajectory
-from ikgym.validation import IDENTITY, LARGEST, FloatArray, Frozen, frozen_array, number, rotation_matrix, shortened
+from ikgym.validation import (
+    IDENTITY,
+    Direction,
+    FloatArray,
+    Frozen,
+    Positive,
+    Rotation,
+    Sizes,
+    Vector,
+    about,
+    shortened,
+)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Obstacle(Frozen, abc.ABC):
-    """Base of all obstacles."""
+    """Base of all obstacles.
+
+    Args:
+        name: Its name.
+        motion: The trajectory of the frame that it is fixed to; at rest, in the base frame, if left out.
+        ignored: Names of bodies that may touch it.
+        count: How many rows of numbers it has.
+
+    Raises:
+        InvalidInputError: A value is wrong.
+    """
 
     name: str
-    motion: Trajectory | None
-    ignored: Sequence[str]
+    motion: Trajectory | None = dataclasses.field(default=None, kw_only=True)
+    ignored: Sequence[str] = dataclasses.field(default=(), kw_only=True)
+    count: int = dataclasses.field(default=1, init=False, repr=False)
     #: Whether it is drawn when an episode begins.
     random: typing.ClassVar[bool] = False
-    #: How many rows of numbers it has.
-    count: int = 1
+
+    def __post_init__(self) -> None:
+        with about(f"Obstacle {shortened(self.name)}"):
+            super().__post_init__()
+            self._check()
+        self._settle(ignored=tuple(self.ignored))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -32,25 +59,13 @@ class Obstacle(Frozen, abc.ABC):
         return (self.name,)
 
     def _check(self) -> None:
-        """Checks what all obstacles have."""
-        if not isinstance(self.name, str) or not self.name:
-            raise InvalidInputError(f"name of an obstacle: expected a text, got {shortened(self.name)}.")
-        if self.motion is not None and (not isinstance(self.motion, Trajectory) or self.motion.random):
-            raise InvalidInputError(
-                f"motion of obstacle {self.name!r}: expected a trajectory that is not random, got "
-                f"{shortened(self.motion)}."
-            )
+        """Checks what fields alone do not show."""
+        if not self.name:
+            raise InvalidInputError("name: expected a text, got an empty one.")
+        if self.motion is not None and self.motion.random:
+            raise InvalidInputError(f"motion: expected a trajectory that is not random, got {shortened(self.motion)}.")
         if not isinstance(self.ignored, (tuple, list)) or not all(isinstance(one, str) for one in self.ignored):
-            raise InvalidInputError(
-                f"ignored of obstacle {self.name!r}: expected a list of names of bodies, got {shortened(self.ignored)}."
-            )
-        self._settle(ignored=tuple(self.ignored))
-
-    def _vector(self, field: str) -> FloatArray:
-        return frozen_array(f"{field} of obstacle {self.name!r}", getattr(self, field), (3,), at_most=LARGEST)
-
-    def _length(self, field: str) -> float:
-        return number(f"{field} of obstacle {self.name!r}", getattr(self, field), above=0.0, at_most=LARGEST)
+            raise InvalidInputError(f"ignored: expected a list of names of bodies, got {shortened(self.ignored)}.")
 
     @abc.abstractmethod
     def numbers(self) -> FloatArray:
@@ -81,28 +96,15 @@ class Obstacle(Frozen, abc.ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sphere(Obstacle):
-    """A sphere.
+    """A sphere. See :class:`Obstacle`.
 
     Args:
-        name: Its name.
         position: Its centre in the base frame, or in the frame of the motion, in [m]. Shape (3,).
         radius: In [m].
-        motion: The trajectory of the frame that it is fixed to; at rest if left out.
-        ignored: Names of bodies that may touch it.
-
-    Raises:
-        InvalidInputError: A value is wrong.
     """
 
-    name: str
-    position: FloatArray
-    radius: float
-    motion: Trajectory | None = None
-    ignored: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        self._check()
-        self._settle(position=self._vector("position"), radius=self._length("radius"))
+    position: Vector
+    radius: Positive
 
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""
@@ -111,30 +113,17 @@ class Sphere(Obstacle):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Capsule(Obstacle):
-    """All that is within a radius of a segment.
+    """All that is within a radius of a segment. See :class:`Obstacle`.
 
     Args:
-        name: Its name.
         start: One end of the segment in the base frame, or in the frame of the motion, in [m]. Shape (3,).
         end: The other end, in [m]. Shape (3,).
         radius: In [m].
-        motion: The trajectory of the frame that it is fixed to; at rest if left out.
-        ignored: Names of bodies that may touch it.
-
-    Raises:
-        InvalidInputError: A value is wrong.
     """
 
-    name: str
-    start: FloatArray
-    end: FloatArray
-    radius: float
-    motion: Trajectory | None = None
-    ignored: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        self._check()
-        self._settle(start=self._vector("start"), end=self._vector("end"), radius=self._length("radius"))
+    start: Vector
+    end: Vector
+    radius: Positive
 
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""
@@ -146,34 +135,17 @@ class Capsule(Obstacle):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Box(Obstacle):
-    """A box.
+    """A box. See :class:`Obstacle`.
 
     Args:
-        name: Its name.
         position: Its centre in the base frame, or in the frame of the motion, in [m]. Shape (3,).
         size: Lengths of its edges in [m], above 0. Shape (3,).
         rotation: A rotation matrix whose columns are the directions of its edges. Shape (3, 3).
-        motion: The trajectory of the frame that it is fixed to; at rest if left out.
-        ignored: Names of bodies that may touch it.
-
-    Raises:
-        InvalidInputError: A value is wrong.
     """
 
-    name: str
-    position: FloatArray
-    size: FloatArray
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-    motion: Trajectory | None = None
-    ignored: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        self._check()
-        size = self._vector("size")
-        if (size <= 0.0).any():
-            raise InvalidInputError(f"size of obstacle {self.name!r}: expected numbers above 0, got {size.tolist()}.")
-        rotation = rotation_matrix(f"rotation of obstacle {self.name!r}", self.rotation)
-        self._settle(position=self._vector("position"), size=size, rotation=rotation)
+    position: Vector
+    size: Sizes
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""
@@ -182,31 +154,15 @@ class Box(Obstacle):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HalfSpace(Obstacle):
-    """All that is on one side of a plane, such as a floor or a wall.
+    """All that is on one side of a plane, such as a floor or a wall. See :class:`Obstacle`.
 
     Args:
-        name: Its name.
         position: A point of the plane in the base frame, or in the frame of the motion, in [m]. Shape (3,).
         normal: The direction out of it, a vector of any length above 0. Shape (3,).
-        motion: The trajectory of the frame that it is fixed to; at rest if left out.
-        ignored: Names of bodies that may touch it.
-
-    Raises:
-        InvalidInputError: A value is wrong.
     """
 
-    name: str
-    position: FloatArray
-    normal: FloatArray
-    motion: Trajectory | None = None
-    ignored: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        self._check()
-        normal = self._vector("normal")
-        if not normal.any():
-            raise InvalidInputError(f"normal of obstacle {self.name!r}: expected a direction, got the zero vector.")
-        self._settle(position=self._vector("position"), normal=normal)
+    position: Vector
+    normal: Direction
 
     def numbers(self) -> FloatArray:
         """See :meth:`Obstacle.numbers`."""

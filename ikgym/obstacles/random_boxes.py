@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import typing
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +14,16 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE
+from ikgym.kernels.random_numbers import stream
 from ikgym.obstacles.obstacle import Box, Obstacle
-from ikgym.validation import LARGEST, FloatArray, number, whole_number
+from ikgym.trajectories import Trajectory, joint_paths_of
+from ikgym.validation import FloatArray, Positive, Sizes, Vector, number, whole_number
 
 #: Where boxes are before they are drawn: so far below the base, in [m].
 AWAY = 1e6
 #: Most boxes of one obstacle.
 MOST_BOXES = 1000
+Count = Annotated[int, functools.partial(whole_number, at_least=1, at_most=MOST_BOXES)]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,10 +33,10 @@ class RandomBoxes(Obstacle):
     A box has edges of any length within a range, any angle about the vertical axis, and stands near the motion: it is
     drawn around a random point of a random body at a random step, and drawn anew until it is near to the arm at that
     step and the motion is clear of it by the margin, at each step and between the steps. So each episode has a clear
-    motion. Boxes may overlap each other. What the arm does to itself is not looked at.
+    motion. Boxes may overlap each other. What the arm does to itself is not looked at. They are called `name 1`,
+    `name 2`, … See :class:`Obstacle`.
 
     Args:
-        name: Its name; the boxes are called `name 1`, `name 2`, …
         lower: Least coordinates of the centres in the base frame, in [m]. Shape (3,).
         upper: Largest ones, in [m]. Shape (3,).
         smallest: Least edges in [m], above 0. Shape (3,).
@@ -39,43 +44,31 @@ class RandomBoxes(Obstacle):
         count: The number of boxes.
         margin: The joint motion is nowhere nearer to a box, in [m].
         within: It comes nearer than that to each box, in [m]. At least the margin.
-        ignored: Names of bodies that may touch them.
 
     Raises:
         InvalidInputError: A value is wrong, or a range the wrong way round.
     """
 
-    name: str
-    lower: FloatArray
-    upper: FloatArray
-    smallest: FloatArray
-    largest: FloatArray
-    count: int = 10
-    margin: float = 0.02
-    within: float = 0.1
-    ignored: Sequence[str] = ()
+    lower: Vector
+    upper: Vector
+    smallest: Sizes
+    largest: Sizes
+    count: Count = dataclasses.field(default=10, kw_only=True)
+    margin: Positive = 0.02
+    within: Positive = 0.1
+    motion: None = dataclasses.field(default=None, init=False)
 
     random: typing.ClassVar[bool] = True
-    motion = None
 
-    def __post_init__(self) -> None:
-        self._check()
+    def _check(self) -> None:
+        super()._check()
         for low, high in (("lower", "upper"), ("smallest", "largest")):
-            self._settle(**{low: self._vector(low), high: self._vector(high)})
-            if (getattr(self, low) > getattr(self, high)).any():
+            least, most = getattr(self, low), getattr(self, high)
+            if (least > most).any():
                 raise InvalidInputError(
-                    f"{low}, {high} of obstacle {self.name!r}: expected {low} <= {high}, got "
-                    f"{getattr(self, low).tolist()} and {getattr(self, high).tolist()}."
+                    f"{low}, {high}: expected {low} <= {high}, got {least.tolist()} and {most.tolist()}."
                 )
-        if (self.smallest <= 0.0).any():
-            raise InvalidInputError(
-                f"smallest of obstacle {self.name!r}: expected numbers above 0, got {self.smallest.tolist()}."
-            )
-        self._settle(
-            count=whole_number(f"count of obstacle {self.name!r}", self.count, at_least=1, at_most=MOST_BOXES),
-            margin=self._length("margin"),
-            within=number(f"within of obstacle {self.name!r}", self.within, at_least=self.margin, at_most=LARGEST),
-        )
+        number("within", self.within, at_least=self.margin)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -143,3 +136,51 @@ def _bends(arm: Arm, paths: FloatArray) -> FloatArray:
     ends = np.maximum(np.linalg.norm(arm.bodies.starts, axis=1), np.linalg.norm(arm.bodies.ends, axis=1))
     far = [links[1:link].sum() + end for link, end in zip(arm.bodies.links, ends, strict=True)]
     return np.maximum(far, 1.0)
+
+
+def drawn_rows(
+    arm: Arm,
+    obstacles: Sequence[Obstacle],
+    first: FloatArray,
+    episodes: Sequence[Trajectory],
+    times: FloatArray,
+    generators: Sequence[np.random.Generator],
+) -> FloatArray:
+    """The obstacles at the start of k episodes, from their rows before any is drawn. Shapes (k, o, 16), (o, 16).
+
+    Generators, one an episode, are touched only where an obstacle is drawn; times are those of the steps in [s].
+    """
+    out = np.tile(first, (len(episodes), 1, 1))
+    if not any(one.random for one in obstacles):
+        return out
+    keys = [int(rng.integers(2**63, dtype=np.uint64)) for rng in generators]
+    paths = joint_paths_of(episodes, np.tile(times, (len(episodes), 1)))
+    for i, (one, rows) in enumerate(_with_rows(obstacles)):
+        if isinstance(one, RandomBoxes):
+            own = np.array([stream(np.uint64(key), np.uint64(i)) for key in keys], dtype=np.uint64)
+            out[:, rows] = one.draw(arm, paths, own)
+    return out
+
+
+def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
+    """Obstacles of one episode, none of them random, from their rows of shape (o, 16)."""
+    out: list[Obstacle] = []
+    for one, rows in _with_rows(obstacles):
+        out += one.boxes(numbers[rows]) if isinstance(one, RandomBoxes) else (one,)
+    return tuple(out)
+
+
+def bounds(obstacles: Sequence[Obstacle], low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest and the largest numbers of obstacles in any episode, from those of obstacles that are not drawn."""
+    low, high = low.copy(), high.copy()
+    for one, rows in _with_rows(obstacles):
+        if isinstance(one, RandomBoxes):
+            low[rows], high[rows] = one.bounds()
+    return low, high
+
+
+def _with_rows(obstacles: Sequence[Obstacle]) -> Iterator[tuple[Obstacle, slice]]:
+    at = 0
+    for one in obstacles:
+        yield one, slice(at, at + one.count)
+        at += one.count

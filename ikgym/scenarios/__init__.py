@@ -11,6 +11,7 @@ is made in Python; :func:`find` takes all the ways to name one.
 from __future__ import annotations
 
 import functools
+import importlib
 import os
 import pathlib
 from collections.abc import Callable
@@ -19,13 +20,11 @@ from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.registry import Registry
-from ikgym.scenarios import files, obstructed
+from ikgym.scenarios import files, published
 from ikgym.scenarios.durations import duration
-from ikgym.scenarios.importing import imported
 from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.scenario import Scenario
-from ikgym.trajectories import PublishedPath
 from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = [
@@ -158,8 +157,23 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
         if item.endswith(".toml"):
             return load(item)
         if ":" in item:
-            return imported(item)
+            return _imported(item)
     return get(item)
+
+
+def _imported(import_path: str) -> Scenario:
+    """The scenario ``"package.module:attribute"``."""
+    name, _, attribute = import_path.partition(":")
+    if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):
+        raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {import_path!r}.")
+    try:
+        module = importlib.import_module(name)
+    except Exception as error:  # whatever the code of others raises
+        fault = f"{type(error).__name__}: {error}"
+        raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {fault}") from error
+    known_name(f"attribute of {name}", attribute, [key for key in vars(module) if key[0] != "_" or key == attribute])
+    found = getattr(module, attribute)
+    return _registry.made(import_path, found if callable(found) else lambda: found)
 
 
 def seeds(split: str, episodes: int) -> tuple[int, ...]:
@@ -181,15 +195,13 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
 
 
 def _published(problem: str) -> Scenario:
-    """One of the random paths of RL-ITG."""
-    steps = 10 * (len(problems.waypoints(problem).positions) - 1)
-    return get("rlitg-random").replace(name=problem, trajectory=PublishedPath(problem, 0.2), steps=steps)
+    return published.scenario(
+        problem, next(get(name) for key, name in published.LIKE.items() if problem.startswith(key))
+    )
 
 
 for _family, _files in FILES.items():
     for _file in _files:
         _registry.register(_file.stem, functools.partial(load, _file), listed=_family not in ("published", "learning"))
-for _name in problems.OBSTRUCTED:
-    _registry.register(_name, functools.partial(obstructed.scenario, _name), listed=False)
-for _name in problems.names("rlitg-random-"):
+for _name in (*problems.OBSTRUCTED, *problems.names("rlitg-random-")):
     _registry.register(_name, functools.partial(_published, _name), listed=False)

@@ -43,8 +43,6 @@ CHOICES: dict[type, Mapping[str, Callable[..., Any]]] = {
 PARTS = (Arm, Bodies, Task, TrackingCost, ProximityCost, Plant, *CHOICES)
 #: Classes in the annotations of texts.
 TEXTS = {str, type(None), os.PathLike[str]}
-#: Annotations of lists that hold no numbers.
-NO_NUMBERS = (Sequence[bool], Sequence[str], Sequence[Sequence[str]])
 
 
 def arguments(
@@ -75,7 +73,8 @@ def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -
         return [_value(kind, name, one, folder, where) for one in value]
     with located(where):
         if kind is None or kind is Task or (hint is Arm and isinstance(value, str)):
-            _check_plain(hint, name, value)
+            if (_meaning(hint) == "a text" or kind is Arm) and not isinstance(value, str):
+                raise InvalidInputError(f"{name}: expected a text, got {value!r}.")
             return tasks.get(value) if kind is Task else arms.get(value) if kind is Arm else value
         if typing.get_origin(hint) is Sequence or not isinstance(value, dict):
             raise InvalidInputError(f"{name}: expected {_meaning(hint)}, got {value!r}.")
@@ -139,21 +138,6 @@ def _meaning(hint: Any) -> str:
     if kind is Task or hint is str or (typing.get_origin(hint) is not Sequence and {str} <= classes <= TEXTS):
         return "a text"
     return "numbers" if kind is None else "a table"
-
-
-def _check_plain(hint: Any, name: str, value: Any) -> None:
-    """Refuses texts and truth values where numbers are expected, and the other way round."""
-    if _meaning(hint) == "a text" or _part(hint) is Arm:
-        if not isinstance(value, str):
-            raise InvalidInputError(f"{name}: expected a text, got {value!r}.")
-    elif isinstance(value, list):
-        for one in value:
-            _check_plain(hint, name, one)
-    elif hint in (bool, bool | None):
-        if not isinstance(value, bool):
-            raise InvalidInputError(f"{name}: expected true or false, got {value!r}.")
-    elif hint not in NO_NUMBERS and (isinstance(value, bool) or not isinstance(value, (int, float))):
-        raise InvalidInputError(f"{name}: expected numbers, got {value!r}.")
 
 
 @contextlib.contextmanager

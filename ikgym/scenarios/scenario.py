@@ -23,7 +23,7 @@ from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.surroundings import Surrounded
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of
-from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, positive
+from ikgym.validation import LARGEST, FloatArray, Frozen, Positive, about, frozen_array, shortened
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
@@ -70,7 +70,7 @@ class Scenario(Frozen, Surrounded):
     trajectory: Trajectory
     velocity_limit: FloatArray = None  # type: ignore[assignment]  # that of the arm
     cost: TrackingCost = dataclasses.field(default_factory=TrackingCost)
-    dt: float = 1e-3
+    dt: Positive = 1e-3
     steps: int = None  # type: ignore[assignment]  # those of the path
     model: Arm = None  # type: ignore[assignment]  # the arm itself
     start: FloatArray | None = None
@@ -83,13 +83,14 @@ class Scenario(Frozen, Surrounded):
     source: str = ""
 
     def __post_init__(self) -> None:
+        self._settle(model=self.arm if self.model is None else self.model)
+        with about(f"Scenario {shortened(self.name)}"):
+            super().__post_init__()
         checks.check_parts(self._fields())
         n = self.arm.joints
-        self._settle(model=self.arm if self.model is None else self.model)
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
-        self._settle_by(positive, "dt")
         if self.start is not None:
-            self._settle_by(frozen_array, "start", shape=(n,), at_most=LARGEST)
+            self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))
         elif self.random and not self.starts_nominally:
             raise InvalidInputError(f"Scenario {self.name!r}: a random Cartesian trajectory needs a start.")
         if self.initial_pose is not None:

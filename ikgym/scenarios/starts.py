@@ -40,14 +40,9 @@ def _likely(arm: Arm, rotation: FloatArray | None, position: FloatArray) -> str:
     if rotation is not None:
         w, x, y, z = quaternion_of(*rotation)
         for order, other in {"x, y, z, w": (z, w, x, y), "w, x, y, z": (x, y, z, w)}.items():
-            if arm.inverse(_rotation(*other), position)[1]:
+            if arm.inverse(matrices(np.array([other]))[0], position)[1]:
                 return f"with quaternions read as {order} it is in reach: is that their order? Expected w, x, y, z"
     return "give a start, or another trajectory"
-
-
-def _rotation(w: float, x: float, y: float, z: float) -> FloatArray:
-    rotation: FloatArray = matrices(np.array([[w, x, y, z]]))[0]
-    return rotation
 
 
 def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:

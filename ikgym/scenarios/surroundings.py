@@ -11,7 +11,7 @@ from gymnasium.utils import seeding
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import Surroundings
-from ikgym.obstacles import Obstacle, drawn
+from ikgym.obstacles import Obstacle, random_boxes
 from ikgym.obstacles.solids import solids_of
 from ikgym.plant import Plant
 from ikgym.plant.draw import episode_key
@@ -58,7 +58,7 @@ class Surrounded(Reference):
     def obstacle_bounds(self) -> tuple[FloatArray, FloatArray]:
         """The smallest and the largest numbers that obstacles have in any episode. Shapes (o, 16)."""
         rows = self.obstacle_rows(self.steps + 2)
-        return drawn.bounds(self.obstacles, rows.min(axis=0), rows.max(axis=0))
+        return random_boxes.bounds(self.obstacles, rows.min(axis=0), rows.max(axis=0))
 
     @property
     def draws_obstacles(self) -> bool:
@@ -79,7 +79,9 @@ class Surrounded(Reference):
         Raises:
             InvalidInputError: There is no room for an obstacle in an episode.
         """
-        return drawn.rows(self.arm, self.obstacles, self.obstacle_rows(1)[0], episodes, self._step_times, generators)
+        return random_boxes.drawn_rows(
+            self.arm, self.obstacles, self.obstacle_rows(1)[0], episodes, self._step_times, generators
+        )
 
     def obstacles_of(self, seed: int | None = None) -> tuple[Obstacle, ...]:
         """The obstacles of an episode, where boxes stand in the place of what is drawn.
@@ -97,7 +99,7 @@ class Surrounded(Reference):
         generator = seeding.np_random(seed)[0]
         episodes = self.trajectory.samples([generator])
         episode_key(self.plant, generator)  # drawn before them
-        return drawn.fixed(self.obstacles, self.drawn_obstacles(episodes, [generator])[0])
+        return random_boxes.fixed(self.obstacles, self.drawn_obstacles(episodes, [generator])[0])
 
     @property
     def _step_times(self) -> FloatArray:

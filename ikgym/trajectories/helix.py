@@ -9,7 +9,7 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, number, signed
+from ikgym.validation import FloatArray, Positive, Signed, Vector
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,17 +29,12 @@ class Helix(Trajectory):
         InvalidInputError: A shape is wrong, or a number not finite or beyond 1e12.
     """
 
-    center: FloatArray
-    radius: float
-    frequency: float
-    climb: float
-    start: float = 0.0
+    center: Vector
+    radius: Positive
+    frequency: Signed
+    climb: Signed
+    start: Signed = 0.0
     has_orientation: typing.ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        self._settle_by(frozen_array, "center", shape=(3,), at_most=LARGEST)
-        self._settle(radius=number("radius", self.radius, above=0.0, at_most=LARGEST))
-        self._settle_by(signed, "frequency", "climb", "start")
 
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""

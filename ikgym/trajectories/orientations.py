@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +13,36 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths import Path
 from ikgym.trajectories.splines import CubicSpline
-from ikgym.validation import LARGEST, FloatArray, Frozen, float_array, frozen_array, read_only, rotation_matrix
+from ikgym.validation import LARGEST, Direction, FloatArray, Frozen, Rotation, Vector, float_array, read_only
 
 # Quaternions of files are rounded: so far may their length be from 1.
 QUATERNION_TOLERANCE = 1e-5
 # The sine of the least angle between the approach and the path, and at how many points of it that is looked at.
 LEAST_SINE, LOOKED_AT = 0.01, 2001
+
+
+def aligned_quaternions(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4)."""
+    given = float_array(name, value, (None, 4), at_most=LARGEST)
+    lengths = np.linalg.norm(given, axis=1)
+    if (np.abs(lengths - 1.0) > QUATERNION_TOLERANCE).any():
+        i = int(np.argmax(np.abs(lengths - 1.0)))
+        raise InvalidInputError(
+            f"{name}: expected unit quaternions, got {given[i].tolist()} of length {lengths[i]:.6g} as number {i}."
+        )
+    exact = given if (np.abs(lengths - 1.0) <= 4e-16).all() else given / lengths[:, None]
+    along = np.sum(exact[1:] * exact[:-1], axis=1)
+    if (np.abs(along) < 1e-6).any():
+        i = int(np.argmin(np.abs(along)))
+        raise InvalidInputError(
+            f"{name}: expected less than half a turn from one to the next, got half a turn from number {i} to number "
+            f"{i + 1}; a waypoint in between says which way around."
+        )
+    signs = np.concatenate([[1.0], np.cumprod(np.where(along < 0.0, -1.0, 1.0))])
+    return read_only(exact * signs[:, None])
+
+
+Quaternions = Annotated[FloatArray, aligned_quaternions]
 
 
 class Orientation(Frozen, abc.ABC):
@@ -55,10 +80,7 @@ class FixedOrientation(Orientation):
         InvalidInputError: It is no rotation.
     """
 
-    rotation: FloatArray
-
-    def __post_init__(self) -> None:
-        self._settle_by(rotation_matrix, "rotation")
+    rotation: Rotation
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`."""
@@ -77,15 +99,8 @@ class AlongPath(Orientation):
         InvalidInputError: The approach is zero, or the rotation none.
     """
 
-    approach: FloatArray = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        approach = frozen_array("approach", self.approach, (3,), at_most=LARGEST)
-        if not approach.any():
-            raise InvalidInputError("approach: expected a direction, got the zero vector.")
-        self._settle(approach=approach)
-        self._settle_by(rotation_matrix, "rotation")
+    approach: Direction = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path may nowhere lead in the direction of the approach."""
@@ -123,12 +138,8 @@ class Turning(Orientation):
         InvalidInputError: The rotation is none, or the vector.
     """
 
-    rotation: FloatArray
-    vector: FloatArray
-
-    def __post_init__(self) -> None:
-        self._settle_by(rotation_matrix, "rotation")
-        self._settle_by(frozen_array, "vector", shape=(3,), at_most=LARGEST)
+    rotation: Rotation
+    vector: Vector
 
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`, with Rodrigues' formula."""
@@ -152,10 +163,7 @@ class OrientationThrough(Orientation):
             way around is not determined.
     """
 
-    quaternions: FloatArray
-
-    def __post_init__(self) -> None:
-        self._settle_by(aligned_quaternions, "quaternions")
+    quaternions: Quaternions
 
     def check(self, path: Path) -> None:
         """See :meth:`Orientation.check`: the path has as many waypoints."""
@@ -167,27 +175,6 @@ class OrientationThrough(Orientation):
     def rotations(self, path: Path, s: FloatArray) -> FloatArray:
         """See :meth:`Orientation.rotations`."""
         return matrices(CubicSpline.through(path.stations, self.quaternions, at_rest=False)(s))
-
-
-def aligned_quaternions(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Unit quaternions w, x, y, z, each with the sign that is nearer to the one before. Shape (k, 4)."""
-    given = float_array(name, value, (None, 4), at_most=LARGEST)
-    lengths = np.linalg.norm(given, axis=1)
-    if (np.abs(lengths - 1.0) > QUATERNION_TOLERANCE).any():
-        i = int(np.argmax(np.abs(lengths - 1.0)))
-        raise InvalidInputError(
-            f"{name}: expected unit quaternions, got {given[i].tolist()} of length {lengths[i]:.6g} as number {i}."
-        )
-    exact = given if (np.abs(lengths - 1.0) <= 4e-16).all() else given / lengths[:, None]
-    along = np.sum(exact[1:] * exact[:-1], axis=1)
-    if (np.abs(along) < 1e-6).any():
-        i = int(np.argmin(np.abs(along)))
-        raise InvalidInputError(
-            f"{name}: expected less than half a turn from one to the next, got half a turn from number {i} to number "
-            f"{i + 1}; a waypoint in between says which way around."
-        )
-    signs = np.concatenate([[1.0], np.cumprod(np.where(along < 0.0, -1.0, 1.0))])
-    return read_only(exact * signs[:, None])
 
 
 def matrices(quaternions: FloatArray) -> FloatArray:

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.orientations import Orientation
 from ikgym.trajectories.paths import Path
 from ikgym.trajectories.time_laws import TimeLaw
@@ -36,10 +35,7 @@ class PathTrajectory(Trajectory):
     orientation: Orientation | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in {"path": Path, "time_law": TimeLaw, "orientation": Orientation}.items():
-            part = getattr(self, name)
-            if not isinstance(part, kind) and not (name == "orientation" and part is None):
-                raise InvalidInputError(f"{name}: expected a {kind.__name__}, got {part!r}.")
+        super().__post_init__()
         self.time_law.time(self.path)
         if self.orientation is not None:
             self.orientation.check(self.path)

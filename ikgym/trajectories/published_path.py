@@ -13,7 +13,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError, listed
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import FloatArray, positive, shortened
+from ikgym.validation import FloatArray, Positive, shortened
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,11 +33,11 @@ class PublishedPath(Trajectory):
     """
 
     problem: str
-    period: float
+    period: Positive
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         problems.waypoints(self.problem)
-        self._settle_by(positive, "period")
 
     @property
     def waypoints(self) -> problems.Waypoints:
@@ -81,17 +81,17 @@ class RandomPublishedPath(Trajectory):
     """
 
     family: str
-    period: float
+    period: Positive
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         members = problems.names(self.family) if isinstance(self.family, str) else ()
         if not members or not all(len(problems.waypoints(name).starts) for name in members):
             raise InvalidInputError(
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
                 f"available: {listed(problems.names())}."
             )
-        self._settle_by(positive, "period")
 
     def sample(self, rng: np.random.Generator) -> PublishedPath:
         """See :meth:`Trajectory.sample`."""

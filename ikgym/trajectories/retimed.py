@@ -12,7 +12,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths.path import check_count
 from ikgym.trajectories.splines import CubicSpline
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array
+from ikgym.validation import FloatArray, Numbers, float_array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,17 +34,22 @@ class RetimedTrajectory(Trajectory):
     """
 
     trajectory: Trajectory
-    times: FloatArray
-    progress: FloatArray
-    rates: FloatArray
+    times: Numbers
+    progress: Numbers
+    rates: Numbers
 
     def __post_init__(self) -> None:
-        if not isinstance(self.trajectory, Trajectory) or self.trajectory.random:
-            raise InvalidInputError(f"trajectory: expected a Trajectory that is not random, got {self.trajectory!r}.")
-        times = frozen_array("times", self.times, (None,), at_most=LARGEST)
-        check_count("times", times)
-        self._settle_by(frozen_array, "times", "progress", "rates", shape=(len(times),), at_most=LARGEST)
-        for name, least in {"times": np.diff(times), "progress": np.diff(self.progress), "rates": self.rates}.items():
+        super().__post_init__()
+        if self.trajectory.random:
+            raise InvalidInputError(f"trajectory: expected one that is not random, got {self.trajectory!r}.")
+        check_count("times", self.times)
+        for name in ("progress", "rates"):
+            float_array(name, getattr(self, name), self.times.shape)
+        for name, least in {
+            "times": np.diff(self.times),
+            "progress": np.diff(self.progress),
+            "rates": self.rates,
+        }.items():
             if (least < 0.0).any() or (name == "times" and not least.all()):
                 raise InvalidInputError(f"{name}: expected numbers that {_WANTED[name]}, got {least.min():g} as one.")
         for name in ("times", "progress"):

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.batch import JointMotions, paths_of
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, number, per_joint
+from ikgym.validation import LARGEST, FloatArray, Interval, Numbers, Positive, float_array, per_joint
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,17 +31,16 @@ class Sinusoid(Trajectory):
         InvalidInputError: A shape is wrong, or a number not finite or beyond 1e12.
     """
 
-    amplitude: FloatArray
+    amplitude: Numbers
     frequency: FloatArray | float = 1.0
     phase: FloatArray | float = 0.0
     offset: FloatArray | float = 0.0
-    sigmoid: float | None = None
+    sigmoid: Positive | None = None
 
     def __post_init__(self) -> None:
-        self._settle_by(frozen_array, "amplitude", shape=(None,), at_most=LARGEST)
-        self._settle_by(per_joint, "frequency", "phase", "offset", n=len(self.amplitude), at_most=LARGEST)
-        if self.sigmoid is not None:
-            self._settle(sigmoid=number("sigmoid", self.sigmoid, above=0.0, at_most=LARGEST))
+        super().__post_init__()
+        for name in ("frequency", "phase", "offset"):
+            self._settle(**{name: per_joint(name, getattr(self, name), len(self.amplitude), at_most=LARGEST)})
 
     def joint_path(self, times: FloatArray) -> FloatArray:
         """See :meth:`Trajectory.joint_path`."""
@@ -71,20 +69,15 @@ class RandomSinusoid(Trajectory):
         InvalidInputError: A shape is wrong, a number not finite or beyond 1e12, or a range the wrong way round.
     """
 
-    amplitude: FloatArray
-    scale: tuple[float, float] = (0.2, 1.0)
-    frequency: tuple[float, float] = (1.0, 3.0)
-    phase: tuple[float, float] = (0.0, 2.0 * np.pi)
+    amplitude: Numbers
+    scale: Interval = (0.2, 1.0)
+    frequency: Interval = (1.0, 3.0)
+    phase: Interval = (0.0, 2.0 * np.pi)
     random: typing.ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        self._settle_by(frozen_array, "amplitude", shape=(None,), at_most=LARGEST)
-        for name in ("scale", "frequency", "phase"):
-            low, high = frozen_array(name, getattr(self, name), (2,), at_most=LARGEST).tolist()
-            if low > high:
-                raise InvalidInputError(f"{name}: expected a range (low, high), got ({low:g}, {high:g}).")
-            self._settle(**{name: (low, high)})
-        frozen_array("amplitude times scale", self.joint_bound(), at_most=LARGEST)
+        super().__post_init__()
+        float_array("amplitude times scale", self.joint_bound(), at_most=LARGEST)
 
     def sample(self, rng: np.random.Generator) -> Sinusoid:
         """See :meth:`Trajectory.sample`. Draws scales, then frequencies, then phases."""

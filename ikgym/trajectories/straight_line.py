@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.rotations import rodrigues, rotation_vector
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, positive, rotation_matrix
+from ikgym.validation import LARGEST, FloatArray, Positive, frozen_array, rotation_matrix
+
+
+def frame(name: str, value: npt.ArrayLike) -> FloatArray:
+    """The 9 numbers of a rotation, row by row, and the position in [m], read-only. Shape (12,)."""
+    numbers = frozen_array(name, value, (12,), at_most=LARGEST)
+    rotation_matrix(f"rotation of {name}", numbers[:9].reshape(3, 3))
+    return numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,17 +39,13 @@ class StraightLine(Trajectory):
             none, or the blends do not fit.
     """
 
-    start: FloatArray
-    end: FloatArray
-    duration: float
-    blend: float
+    start: Annotated[FloatArray, frame]
+    end: Annotated[FloatArray, frame]
+    duration: Positive
+    blend: Positive
 
     def __post_init__(self) -> None:
-        for name in ("start", "end"):
-            frame = frozen_array(name, getattr(self, name), (12,), at_most=LARGEST)
-            rotation_matrix(f"rotation of {name}", frame[:9].reshape(3, 3))
-            self._settle(**{name: frame})
-        self._settle_by(positive, "duration", "blend")
+        super().__post_init__()
         if 2.0 * self.blend > self.duration:
             raise InvalidInputError(
                 f"blend: expected at most half of the duration of {self.duration:g} s, got {self.blend:g} s."

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths import Path
-from ikgym.validation import LARGEST, SMALLEST, FloatArray, Frozen, number
+from ikgym.validation import FloatArray, Frozen, Positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,15 +29,9 @@ class TimeLaw(Frozen, abc.ABC):
         InvalidInputError: A number is out of its range.
     """
 
-    speed: float
-    acceleration: float
-    duration: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("speed", "acceleration", "duration"):
-            value = getattr(self, name)
-            if value is not None or name != "duration":
-                self._settle(**{name: number(name, value, at_least=SMALLEST, at_most=LARGEST)})
+    speed: Positive
+    acceleration: Positive
+    duration: Positive | None = None
 
     def time(self, path: Path) -> float:
         """Duration, in [s].

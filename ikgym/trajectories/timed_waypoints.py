@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import Annotated
 
 import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.orientations import aligned_quaternions, matrices
+from ikgym.trajectories.orientations import Quaternions, matrices
 from ikgym.trajectories.paths.path import check_count
 from ikgym.trajectories.splines import CubicSpline
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array
+from ikgym.validation import LARGEST, FloatArray, Numbers, float_array, frozen_array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,12 +34,13 @@ class TimedWaypoints(Trajectory):
             quaternion has not the length 1.
     """
 
-    times: FloatArray
-    positions: FloatArray
-    quaternions: FloatArray | None = None
+    times: Numbers
+    positions: Annotated[FloatArray, functools.partial(frozen_array, shape=(None, 3), at_most=LARGEST)]
+    quaternions: Quaternions | None = None
 
     def __post_init__(self) -> None:
-        times = frozen_array("times", self.times, (None,), at_most=LARGEST)
+        super().__post_init__()
+        times = self.times
         check_count("times", times)
         if times[0] < 0.0:
             raise InvalidInputError(f"times: expected times from 0 on, got {times[0]:g} s as the first.")
@@ -48,12 +50,9 @@ class TimedWaypoints(Trajectory):
                 f"times: expected times that rise, got {times[i]:g} s and {times[i + 1]:g} s as numbers {i} and "
                 f"{i + 1}."
             )
-        self._settle(times=times)
-        positions = frozen_array("positions", self.positions, (len(times), 3), at_most=LARGEST)
-        self._settle(positions=positions)
+        float_array("positions", self.positions, (len(times), 3))
         if self.quaternions is not None:
-            quaternions = frozen_array("quaternions", self.quaternions, (len(times), 4))
-            self._settle(quaternions=aligned_quaternions("quaternions", quaternions))
+            float_array("quaternions", self.quaternions, (len(times), 4))
         self._settle(has_orientation=self.quaternions is not None)
 
     @property

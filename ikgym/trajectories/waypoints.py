@@ -20,7 +20,7 @@ from ikgym.trajectories.paths.path import MOST_POINTS
 from ikgym.trajectories.time_laws import TIME_LAWS
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, frozen_array, known_name, shortened
+from ikgym.validation import LARGEST, FloatArray, about, frozen_array, known_name, shortened
 
 #: Largest size of a file in bytes.
 MOST_BYTES = 2**26
@@ -104,7 +104,7 @@ def from_csv(
     """
     columns = _columns(file)
     quaternions = np.column_stack([columns[name] for name in QUATERNION]) if "qw" in columns else None
-    try:
+    with about(file):
         return through(
             np.column_stack([columns[name] for name in POSITION]),
             quaternions,
@@ -115,8 +115,6 @@ def from_csv(
             time_law=time_law,
             orientation=orientation,
         )
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{file}: {error}") from None
 
 
 def _columns(file: str | os.PathLike[str]) -> dict[str, FloatArray]:

@@ -51,16 +51,6 @@ WHOLE = robot(
 )
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(content, name="arm.urdf"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return write
-
-
 def pinocchio_pose(xml, base, tip, coordinates):
     """Where Pinocchio, reading the whole file, sees the tip from the base; coordinates by names of joints."""
     model = pin.buildModelFromXML(xml)

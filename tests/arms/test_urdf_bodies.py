@@ -12,9 +12,10 @@ from ikgym.arms import Arm, from_urdf
 from ikgym.arms.urdf import bodies as urdf_bodies
 from ikgym.arms.urdf.covering import Capsule, around, around_box, distances
 from ikgym.exceptions import InvalidInputError
+from tests.arms.test_urdf import LIMIT
+from tests.arms.test_urdf import joint as bare
 
 PANDA = Path(__file__).parents[1] / "robots" / "panda_hand.urdf"
-LIMIT = '<limit lower="-1.5" upper="2.5" velocity="3" effort="1"/>'
 
 
 def shape(geometry, xyz="0 0 0", rpy="0 0 0"):
@@ -22,10 +23,7 @@ def shape(geometry, xyz="0 0 0", rpy="0 0 0"):
 
 
 def joint(name, parent, child, kind="revolute", xyz="0 0 0", rpy="0 0 0", axis="0 0 1"):
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{LIMIT}</joint>'
-    )
+    return bare(name, parent, child, kind, f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{LIMIT}')
 
 
 def robot(links, joints):
@@ -52,15 +50,6 @@ JOINTS = [
     joint("jaw", "tool", "finger", "prismatic", "0 0.02 0.1", "0 0 0.3", "0 1 0"),
 ]
 SMALL = robot(LINKS, JOINTS)
-
-
-@pytest.fixture
-def write(tmp_path):
-    def write(content):
-        (tmp_path / "arm.urdf").write_text(content)
-        return tmp_path / "arm.urdf"
-
-    return write
 
 
 def placed(arm, q, number, point):

@@ -42,10 +42,11 @@ def test_shapes_and_units(name):
 
 def test_the_numbers_have_not_changed():
     digest = hashlib.sha256()
-    for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:]):
-        for array in (*problems.waypoints(name), *(problems.trajectory(name, m) for m in problems.published(name))):
+    for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:], *problems.OBSTRUCTED):
+        trajectories = (problems.trajectory(name, method) for method in problems.published(name))
+        for array in (*problems.waypoints(name), problems.boxes(name), *trajectories):
             digest.update(np.rint(1e6 * array).astype(np.int64).tobytes())
-    assert digest.hexdigest()[:12] == "aa878e2b219e"
+    assert digest.hexdigest()[:12] == "72e2c5cc1574"
 
 
 def test_the_first_waypoints_are_where_the_published_starts_are():
@@ -81,3 +82,18 @@ def test_both_sources_have_two_paths_in_common(one, other):
     first, second = problems.waypoints(f"rlitg-{one}"), problems.waypoints(f"cppflow-fetch_arm-{other}")
     np.testing.assert_allclose(first.positions, second.positions, atol=1.1e-6)
     np.testing.assert_allclose(first.quaternions, second.quaternions, atol=1e-12)
+
+
+def test_boxes_are_where_they_were_published():
+    """Numbers of the files: centres in the base frame, edges, and the yaw of RL-ITG's only turned boxes."""
+    assert problems.boxes("rlitg-square").tolist() == [[0.75, 0.0, 0.36, 0.70, 1.40, 0.72, 0.0]]
+    assert problems.boxes("cppflow-panda-1cube").tolist() == [[0.0, 0.2, 0.7, 0.25, 0.25, 0.25, 0.0]]
+    np.testing.assert_allclose(problems.boxes("cppflow-fetch-s")[0], [0.75, 0.0, 0.16, 0.70, 1.40, 0.72, 0.0])
+    counts = [len(problems.boxes(name)) for name in problems.names("rlitg-obstacle")]
+    assert (len(counts), sum(counts), max(counts)) == (100, 102, 3)
+    turned = [row for name in problems.names("rlitg-obstacle") for row in problems.boxes(name).tolist() if row[6]]
+    assert turned == [[0.51, 0.2, 0.625658483, 0.15, 0.15, 0.3, 0.3], [0.9, -0.4, 0.725658483, 0.15, 0.15, 0.7, -0.3]]
+    name = next(name for name in problems.names("rlitg-obstacle") if len(problems.boxes(name)) == 3)
+    box = ikgym.scenarios.get(name).obstacles[1]
+    np.testing.assert_allclose(box.rotation, Rotation.from_euler("z", 0.3).as_matrix(), atol=1e-12)
+    assert problems.boxes("rlitg-hello").shape == (0, 7)

@@ -1,6 +1,5 @@
 """Scenarios as files: nothing is lost on the way, and every mistake in a file is named."""
 
-import dataclasses
 import math
 import tomllib
 import typing
@@ -25,7 +24,7 @@ from ikgym.scenarios.toml import document
 from ikgym.trajectories import Helix, PathTrajectory, Quintic, Sinusoid, TimeLaw, Trajectory, paths
 from ikgym.trajectories.orientations import Orientation
 from tests.arms.test_urdf import LIMIT, joint, robot
-from tests.comparison import identical
+from tests.comparison import fields, identical
 from tests.every_scenario import every_scenario
 from tests.test_bad_input import GOOD
 
@@ -48,16 +47,16 @@ OWN = Arm(
         (0, 3, 2),
         [[0, 0, 1 / 3], [0.1, 0, 0], [-0.0, 5e-324, 1e12]],
         [[0, 0, 0.1], [0.1, 0, 0], [1, 2, 3]],
-        (1 / 3, 1e-300, 0.2),
+        (1 / 3, 1e-12, 0.2),
         (("upper", "column"),),
     ),
 )
 MOTION = Helix([1 / 3, 0, 0], 0.1, 0.2, 3.0)
 OBSTACLES = (
-    Sphere("ball", [1 / 3, -0.0, 1e-300], 1 / 3, MOTION, ("upper", 'the "tool"')),
-    Capsule("bar", [0, 0, 1 / 3], [0.1, 0.2, 0.3], 0.1, Sinusoid(0.1 * np.ones(3)), ("upper",)),
+    Sphere("ball", [1 / 3, -0.0, 1e-300], 1 / 3, motion=MOTION, ignored=("upper", 'the "tool"')),
+    Capsule("bar", [0, 0, 1 / 3], [0.1, 0.2, 0.3], 0.1, motion=Sinusoid(0.1 * np.ones(3)), ignored=("upper",)),
     Box("crate", [1, 2, 3], [1 / 3, 1e-12, 1], Rotation.random(rng=np.random.default_rng(2)).as_matrix()),
-    HalfSpace("größe", [0, 0, -9], [0, 1 / 3, 1], MOTION.replace(radius=1.0), ("upper",)),
+    HalfSpace("größe", [0, 0, -9], [0, 1 / 3, 1], motion=MOTION.replace(radius=1.0), ignored=("upper",)),
 )
 #: A scenario in which nothing has its default.
 WHOLE = Scenario(
@@ -100,18 +99,6 @@ WHOLE = Scenario(
     collisions=True,
     proximity=ikgym.ProximityCost(1 / 3, 1e-3, 2.5, 1.5),
 )
-
-
-def fields(part):
-    """All that a part is made of, in plain values."""
-    if dataclasses.is_dataclass(part):
-        return [
-            type(part).__name__,
-            {f.name: fields(getattr(part, f.name)) for f in dataclasses.fields(part) if f.init},
-        ]
-    if isinstance(part, tuple) and part and dataclasses.is_dataclass(part[0]):
-        return [fields(one) for one in part]
-    return "None" if part is None else part
 
 
 @pytest.mark.parametrize("name", every_scenario())
@@ -331,9 +318,9 @@ BAD = [
     ({"dt": "[" * 10**5}, "expected TOML"),
     ({"a." * 10**5 + "a": "1"}, "expected keys of at most 50 names"),
     ({"'a' . \"b c\" . " * 10**5 + "a": "1"}, "expected keys of at most 50 names"),
-    ({"dt": "2026-01-01"}, "dt: expected numbers, got datetime"),
+    ({"dt": "2026-01-01"}, "dt: expected a finite number .* got datetime"),
     ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint"),
-    ({"velocity_limit": "true"}, "velocity_limit: expected numbers"),
+    ({"velocity_limit": "true"}, "velocity_limit: expected an array of real numbers, got True"),
     ({"arm": None}, "arm: expected the name of an arm or a table"),
     ({"arm": "3"}, "arm: expected the name of an arm or a table"),
     ({"arm": "'varga8'"}, "Did you mean 'varga7'"),

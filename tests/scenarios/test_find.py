@@ -80,7 +80,7 @@ def test_registered_names_take_precedence(folder, own_registries):
         (None, "got None"),
         ("shot.toml", "Cannot read"),
         ("my_scenarios:SHOT", "Did you mean 'SHORT'"),
-        ("my_scenarios:number", "expected a Scenario or what makes one"),
+        ("my_scenarios:number", "expected its maker to give an object of Scenario, got 3"),
         ("my_scenarios:fail", "ZeroDivisionError: division by zero"),
         ("no_such:x", "cannot be imported"),
         ("my_faulty:x", "cannot be imported: .*no_such_module"),

@@ -1,7 +1,6 @@
 """Scenarios: data, checks, seeds, and the values that PAPERS prescribes."""
 
 import itertools
-import pickle
 
 import numpy as np
 import pytest
@@ -57,15 +56,6 @@ def test_nominal_is_the_model_on_the_nominal_joint_path(name):
         assert scenario.jogs or np.array_equal(scenario.start_of(3), path[0])
         observation, _ = ikgym.RedundantIKEnv(scenario.replace(plant=ikgym.Plant())).reset(seed=3)
         np.testing.assert_array_equal(observation["q"], path[0])
-
-
-@pytest.mark.parametrize("name", ["varga7-random", "khan8-q1", "panda-glue"])
-def test_pickling_keeps_everything(name):
-    scenario = scenarios.get(name)
-    copy = pickle.loads(pickle.dumps(scenario))
-    np.testing.assert_array_equal(copy.nominal(seed=1), scenario.nominal(seed=1))
-    assert not copy.velocity_limit.flags.writeable
-    assert not copy.arm.chain.offsets.flags.writeable
 
 
 def test_disturbance_moves_the_arm_as_said():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import ikgym
 from ikgym.trajectories import RetimedTrajectory
@@ -33,11 +32,3 @@ def test_joint_paths_too():
     np.testing.assert_array_equal(slower.joint_path(times), base.joint_path(slower.base_times(times)))
     np.testing.assert_array_equal(slower.first_joints(), base.first_joints())
     np.testing.assert_array_equal(slower.joint_bound(), base.joint_bound())
-
-
-@pytest.mark.parametrize("base", ["panda-square", "panda-singular", "cppflow-panda-square"])
-def test_a_file_gives_it_back(base, tmp_path):
-    found = ikgym.scenarios.get(base)
-    scenario = found.replace(trajectory=RetimedTrajectory(found.trajectory, TIMES, PROGRESS, RATES), steps=900)
-    scenario.save(tmp_path / "slower.toml")
-    np.testing.assert_array_equal(ikgym.scenarios.load(tmp_path / "slower.toml").nominal(), scenario.nominal())

@@ -12,8 +12,8 @@ from ikgym.validation import FloatArray
 
 # A box has at most so many capsules side by side.
 MOST = 4
-# Directions in which the outermost of many points are looked for, and the capsules that a search around them tries.
-DIRECTIONS, TRIALS = 256, 1500
+# Capsules that a search around points tries from each of their principal axes.
+TRIALS = 1500
 
 
 class Capsule(NamedTuple):
@@ -61,9 +61,8 @@ def around_box(size: tuple[float, ...]) -> list[Capsule]:
 
 def around(points: FloatArray) -> Capsule:
     """A capsule around points (p, 3) in [m], the smallest that a search finds from each of their principal axes."""
-    outer = _outer(points)
-    axes = np.linalg.svd(outer - outer.mean(axis=0))[2]
-    ends = min((_searched(outer, axis) for axis in axes), key=lambda found: _cost(found, outer))
+    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
+    ends = min((_searched(points, axis) for axis in axes), key=lambda found: _cost(found, points))
     return Capsule(ends[:3], ends[3:], float(distances(points, ends[:3], ends[3:]).max()))
 
 
@@ -86,14 +85,6 @@ def _searched(points: FloatArray, axis: FloatArray) -> FloatArray:
     corners = np.vstack([first, first + 0.1 * size * np.eye(6)])
     options = {"initial_simplex": corners, "maxfev": TRIALS, "xatol": 1e-4 * size, "fatol": 1e-5 * size**3}
     return np.asarray(minimize(_cost, first, args=(points,), method="Nelder-Mead", options=options).x)
-
-
-def _outer(points: FloatArray) -> FloatArray:
-    """The outermost points in many directions, which are evenly spread over the sphere."""
-    height = np.linspace(-1.0, 1.0, DIRECTIONS)
-    turn, width = np.arange(DIRECTIONS) * math.pi * (3.0 - math.sqrt(5.0)), np.sqrt(1.0 - height**2)
-    directions = np.column_stack([width * np.cos(turn), width * np.sin(turn), height])
-    return np.asarray(points[np.unique([int(np.argmax(points @ direction)) for direction in directions])])
 
 
 def _cost(ends: FloatArray, points: FloatArray) -> float:

@@ -1,17 +1,27 @@
-"""Collision geometry of a URDF file as capsules in the frame of its link."""
+"""Collision geometry of a URDF file as capsules in the frame of its link; meshes only where a caller asks for them."""
 
 from __future__ import annotations
 
+import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ikgym.arms.urdf import meshes, xml
+from ikgym.arms.urdf import xml
 from ikgym.arms.urdf.covering import Capsule, along, around, around_box
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.files import read_user_file
+from ikgym.validation import LARGEST, FloatArray
+
+KINDS = (".stl", ".obj", ".ply", ".dae")
+# Collision meshes take some hundred kilobytes.
+MAX_BYTES = 64 * 2**20
+# A package is a folder at most so far above the URDF file.
+LEVELS = 8
 
 
 class Solid(NamedTuple):
@@ -68,9 +78,55 @@ def _box(where: str, shape: Element) -> Solid:
 
 
 def _mesh(where: str, shape: Element, folder: Path) -> Solid:
-    points, volume = meshes.corners(where, xml.attribute(where, shape, "filename"), folder)
+    points, volume = _corners(where, xml.attribute(where, shape, "filename"), folder)
     scale = np.array(xml.numbers(where, shape, "scale", 3)) if "scale" in shape.attrib else np.ones(3)
     return Solid([around(points * scale)], volume * abs(float(np.prod(scale))))
+
+
+def _corners(where: str, name: str, folder: Path) -> tuple[FloatArray, float]:
+    """The outer corners of a mesh, of shape (p, 3), and the volume of their convex hull, in the unit of the mesh.
+
+    Its name is a path from the folder of the URDF file, or ``package://…``, or ``file://…``.
+    """
+    try:
+        import trimesh
+    except ImportError as error:
+        raise MissingDependencyError('Meshes need trimesh: pip install "ikgym[urdf]"') from error
+    path = _found(where, name, folder)
+    if path.suffix.lower() not in KINDS:
+        raise InvalidInputError(f"{where}: expected a mesh of kind {', '.join(KINDS)}, got {name!r}.")
+    content = read_user_file(path, MAX_BYTES)
+    if path.suffix.lower() == ".dae" and (not content.lstrip().startswith(b"<") or b"<!DOCTYPE" in content):
+        raise InvalidInputError(f"{where}: expected XML without a DOCTYPE in {name!r}.")
+    try:
+        mesh = trimesh.load_mesh(io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False)
+        hull = mesh.convex_hull
+        points, volume = np.array(hull.vertices, dtype=float), float(hull.volume)
+    except Exception as error:  # whatever trimesh raises, it is about this file
+        raise InvalidInputError(f"{where}: expected a mesh in {name!r}, got the error: {error}") from error
+    if not (np.abs(points) <= LARGEST).all():
+        raise InvalidInputError(f"{where}: expected corners of at most {LARGEST:g} in {name!r}.")
+    return points, volume
+
+
+def _found(where: str, name: str, folder: Path) -> Path:
+    for path in _candidates(name, folder):
+        if path.is_file():
+            return path
+    raise InvalidInputError(
+        f"{where}: expected the mesh {name!r} below {str(folder)!r} or beside it, found no such file."
+    )
+
+
+def _candidates(name: str, folder: Path) -> Iterator[Path]:
+    scheme, _, rest = name.rpartition("://")
+    if scheme != "package":
+        yield folder / rest
+        return
+    for above in (folder, *folder.parents)[:LEVELS]:
+        yield above / rest
+        if above.name == rest.split("/")[0]:
+            yield above.parent / rest
 
 
 READERS = {"sphere": _sphere, "cylinder": _cylinder, "capsule": _capsule, "box": _box}

@@ -11,16 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
-from ikgym.arms.home import from_home
 from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
-from ikgym.arms.urdf.chain import read_chain
-from ikgym.arms.urdf.joint import MOVING, UrdfJoint
-from ikgym.arms.urdf.tips import Tip, likely_tips
+from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chain
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, frozen_array, known_name, rotation_matrix
+from ikgym.validation import FloatArray, about, flag, frozen_array, known_name, rotation_matrix
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -84,21 +81,22 @@ def from_urdf(
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed, or for meshes trimesh or SciPy.
     """
+    flag("meshes", meshes)
     content = read_user_file(path, MAX_BYTES)
-    try:
+    with about(path):
         tree = Tree(content)
         begin, joints = read_chain(tree, base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
         tool = None if tool is None else frozen_array("tool", tool, (3,))
         tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
         home = _with_tool(_home(joints), tool, tool_rotation)
-        arm = from_home(
+        arm = Arm(
             tree.name if name is None else name,
+            np.diff(home.points, axis=0, prepend=np.zeros((1, 3))),  # all link frames are parallel to the base at q = 0
             home.axes,
-            home.points,
             [joint.kind == "prismatic" for joint in moving],
-            home.rotation,
-            home.position,
+            tool=home.position - home.points[-1],
+            tool_rotation=home.rotation,
             lower=[joint.lower for joint in moving],
             upper=[joint.upper for joint in moving],
             velocity_limit=[joint.velocity for joint in moving],
@@ -108,8 +106,6 @@ def from_urdf(
         arm = with_bodies(arm, tree, begin, file.parent if meshes else None)
         object.__setattr__(arm, "urdf", UrdfReference(file, base, tip, tool, tool_rotation, meshes))
         return arm
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
 
 
 def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ...]:
@@ -127,13 +123,11 @@ def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ..
         UnknownNameError: There is no link of that name.
     """
     content = read_user_file(path, MAX_BYTES)
-    try:
+    with about(path):
         tree = Tree(content)
         if base is not None:
             known_name("link", base, tree.links)
         return tuple(likely_tips(tree, tree.root if base is None else base))
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
 
 
 def _with_tool(tip: _Home, tool: FloatArray | None, tool_rotation: FloatArray | None) -> _Home:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from ikgym.arms.urdf import xml
-from ikgym.arms.urdf.joint import KINDS
 from ikgym.exceptions import InvalidInputError
 
 # Parsers of URDF call themselves once a link: a chain of thousands overflows their stack, and that is the end
 # of the whole process.
 MAX_JOINTS = 128
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 class Tree:

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from ikgym.trajectories.paths.path import Path, points_of
-from ikgym.validation import LARGEST, FloatArray, frozen_array
+from ikgym.validation import FloatArray, Vector
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class Line(Path):
         InvalidInputError: A shape is wrong, or both are the same.
     """
 
-    start: FloatArray
-    end: FloatArray
+    start: Vector
+    end: Vector
 
     def __post_init__(self) -> None:
-        self._settle_by(frozen_array, "start", "end", shape=(3,), at_most=LARGEST)
+        super().__post_init__()
         points_of("start and end", [self.start, self.end])
 
     @property

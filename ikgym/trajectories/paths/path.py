@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import abc
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array, rotation_matrix
+from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array
 
 
 class Path(Frozen, abc.ABC):
@@ -67,12 +68,6 @@ class Outline(Path):
         return self.outline.along(s)
 
 
-def settle_placement(path: Path) -> None:
-    """Checks the center and the rotation that place a plane figure."""
-    path._settle_by(frozen_array, "center", shape=(3,), at_most=LARGEST)
-    path._settle_by(rotation_matrix, "rotation")
-
-
 def points_of(name: str, value: npt.ArrayLike) -> FloatArray:
     """Two points or more, of which no two that follow each other are the same. Shape (k, 3)."""
     points = frozen_array(name, value, (None, 3), at_most=LARGEST)
@@ -93,6 +88,8 @@ def check_count(name: str, points: FloatArray) -> None:
         raise InvalidInputError(f"{name}: expected from 2 to {MOST_POINTS} waypoints, got {len(points)}.")
 
 
+#: Points of a path, as a field that is checked.
+Points = Annotated[FloatArray, points_of]
 #: Most waypoints: they are read and made into a path within 10 s.
 MOST_POINTS = 200_000
 #: Points that follow each other are at least this far apart, in [m].

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, points_of, settle_placement
-from ikgym.validation import SMALLEST, FloatArray, number, positive, whole_number
+from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, Points
+from ikgym.validation import FloatArray, Positive, Rotation, Vector, number, whole_number
 
 # Corners that turn by less than this, in [rad], are none.
 STRAIGHT = 1e-9
@@ -49,13 +49,11 @@ class Polyline(Path):
             back, or an arc does not fit in between the points around it; the message says which and how much does.
     """
 
-    points: FloatArray
-    corner_radius: float
+    points: Points
+    corner_radius: Positive
 
     def __post_init__(self) -> None:
-        self._settle_by(points_of, "points")
-        radius = positive("corner_radius", self.corner_radius)
-        self._settle(corner_radius=radius)
+        super().__post_init__()
         self._check_corners()
 
     @property
@@ -155,16 +153,14 @@ class Square(Outline):
         InvalidInputError: A number is out of its range, or the rotation none.
     """
 
-    center: FloatArray
-    side: float
-    corner_radius: float
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+    center: Vector
+    side: Positive
+    corner_radius: Positive
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        settle_placement(self)
-        self._settle_by(positive, "side")
-        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=0.5 * self.side)
-        self._settle(corner_radius=radius)
+        super().__post_init__()
+        number("corner_radius", self.corner_radius, at_most=0.5 * self.side)
 
     @functools.cached_property
     def outline(self) -> Polyline:
@@ -190,20 +186,17 @@ class Raster(Outline):
         InvalidInputError: A number is out of its range, or the rotation none.
     """
 
-    center: FloatArray
-    width: float
-    height: float
-    lines: int
-    corner_radius: float
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
+    center: Vector
+    width: Positive
+    height: Positive
+    lines: Annotated[int, functools.partial(whole_number, at_least=2, at_most=MOST_POINTS // 2)]
+    corner_radius: Positive
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        settle_placement(self)
-        self._settle(lines=whole_number("lines", self.lines, at_least=2, at_most=MOST_POINTS // 2))
-        self._settle_by(positive, "width", "height")
-        most = 0.5 * min(self.height / (self.lines - 1), self.width)
-        radius = number("corner_radius", self.corner_radius, at_least=SMALLEST, at_most=most)
-        self._settle(corner_radius=radius)
+        super().__post_init__()
+        between = self.height / (self.lines - 1)
+        number("corner_radius", self.corner_radius, at_most=0.5 * min(between, self.width))
 
     @functools.cached_property
     def outline(self) -> Polyline:

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from ikgym.trajectories.paths.path import Path, settle_placement
+from ikgym.trajectories.paths.path import Path
 from ikgym.trajectories.splines import ArcLength
-from ikgym.validation import FloatArray, positive, signed
+from ikgym.validation import FloatArray, Positive, Rotation, Signed, Vector
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,16 +28,11 @@ class CircularHelix(Path):
         InvalidInputError: A number is out of its range, or the rotation none.
     """
 
-    center: FloatArray
-    radius: float
-    pitch: float
-    turns: float = 1.0
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        settle_placement(self)
-        self._settle_by(positive, "radius", "turns")
-        self._settle_by(signed, "pitch")
+    center: Vector
+    radius: Positive
+    pitch: Signed
+    turns: Positive = 1.0
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     @property
     def length(self) -> float:
@@ -94,13 +89,9 @@ class Lemniscate(Path):
         InvalidInputError: A number is out of its range, or the rotation none.
     """
 
-    center: FloatArray
-    radius: float
-    rotation: FloatArray = dataclasses.field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        settle_placement(self)
-        self._settle_by(positive, "radius")
+    center: Vector
+    radius: Positive
+    rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
     @property
     def length(self) -> float:

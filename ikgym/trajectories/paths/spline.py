@@ -9,7 +9,7 @@ import numpy as np
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.cubic_splines import extremes
-from ikgym.trajectories.paths.path import Path, points_of
+from ikgym.trajectories.paths.path import Path, Points
 from ikgym.trajectories.splines import ArcLength, CubicSpline
 from ikgym.validation import FloatArray
 
@@ -31,11 +31,11 @@ class SplinePath(Path):
             would turn straight back; the message says where.
     """
 
-    points: FloatArray
+    points: Points
     _curvature: float = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._settle_by(points_of, "points")
+        super().__post_init__()
         least, i, curvature = extremes(self._spline.knots, self._spline.values, self._spline.slopes, SAMPLES)
         if least < LEAST_SPEED:
             raise InvalidInputError(
