@@ -28,7 +28,7 @@ from baselines.training.config import APG, TrainingError
 from baselines.training.folder import FORMAT, Checkpoint, Folder
 from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.trainer import SegmentMetrics, Trainer
-from baselines.training.validation import Score, bound, validate
+from baselines.training.validation import Score, bound, validated
 
 #: Weights above this have diverged.
 LARGEST = 1e9
@@ -155,7 +155,7 @@ class _Run:
         row.update({name: value for name, value in metrics.items() if math.isfinite(value)})
         score = None
         if done % config.evaluate_every == 0 or done == config.segments:
-            score = validate(trainer.agent(), self._scenario, config.validation_episodes)
+            score = validated(bound(trainer.agent(), self._scenario), self._scenario, config.validation_episodes)
             row["validation"] = vars(score)
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
                 weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}

@@ -1,4 +1,4 @@
-"""Kernels of the damped inverse to which a bilinear agent may add its matrix, and of its gradient.
+"""Kernels of the damped inverse to which a bilinear agent adds its matrix, and of its gradient.
 
 With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
 damping, which the network gives beside G and h,

@@ -126,7 +126,7 @@ Files of a run of apg, which may be killed at any time:
   agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
-used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
+used. The cost ratio is stated where the best known costs of all validation episodes are known."""
 
 
 def main(arguments: Sequence[str]) -> int:

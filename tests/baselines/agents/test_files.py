@@ -127,9 +127,8 @@ REFUSED = [
     *((lambda ahead=ahead: Track(ahead), "ahead: expected") for ahead in ((), (0.0, 0.1), (0.2, 0.1), ("a",), 0.1)),
     *((lambda steps=steps: Bilinear(steps), "offsets: expected") for steps in ((1,), (2, 5), (1, 5, 5), (1, 2.5))),
     *((lambda number=number: Bilinear((1, 5), number), "damping: ") for number in (0.0, float("nan"), "much")),
-    (lambda: Bilinear((1, 5), 1e-2).outputs(SKEW), "damping: expected None for skew coordinates"),
-    # Of a version that knew other joint rates.
-    (lambda: Bilinear.from_json({"damping": 1e-2}), "damping: expected it together with predicted rates"),
+    (lambda: Bilinear((1, 5)).outputs(SKEW), "task: expected another than skew coordinates"),
+    (lambda: Bilinear.from_json({"damping": None}), "damping: expected a finite number above 0"),
     (lambda: network((2, 2), "relo"), "no activation 'relo'"),
 ]
 

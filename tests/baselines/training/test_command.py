@@ -21,7 +21,7 @@ from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
-    "--scenario", "varga7-random", "--task", "pose", "--steps", "40", "--hidden", "8", "--offsets", "1", "2", "10",
+    "--scenario", "varga7-random", "--steps", "40", "--hidden", "8", "--offsets", "1", "2", "10",
     "--segments", "2", "--n-envs", "4", "--window", "16", "--segment-steps", "48", "--validation-episodes", "1",
     "--no-progress",
 ]  # fmt: skip
@@ -83,7 +83,7 @@ def test_repeat(alone, tmp_path, capsys):
     ("content", "message"),
     [
         ({"weights_sha256": None}, "has not ended"),
-        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 layers, got 3"),
+        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 whole numbers, got 3"),
         ({"format": 1}, f"expected the run.json of a training in format {FORMAT}"),
     ],
 )

@@ -28,8 +28,7 @@ FORK.set_forkserver_preload(["baselines.training.run"])
 
 CASES = {
     "plain": CONFIG,
-    "damped": tiny(damping=4e-4),
-    "skew, end within a segment": tiny(task="skew", steps=20),
+    "end within a segment": tiny(steps=20),
     "held for longer than it sees": tiny(offsets=(1, 2)),
 }
 

@@ -15,7 +15,7 @@ CASES = [("varga7", "pose"), ("varga7", "position"), ("puma560", "matrix"), ("ti
 
 
 def held(problem, q, output):
-    out = np.empty((len(q), Bilinear(OFFSETS).outputs(problem)))
+    out = np.empty((len(q), DAMPED.held(problem)))
     held_rows(problem.task.kind, problem.model.chain, DAMPING, q, output, out)
     return out
 
