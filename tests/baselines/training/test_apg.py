@@ -105,7 +105,7 @@ def test_runs_begin_from_an_agent(tmp_path):
     play_segments(trained, [0])
     save_agent(tmp_path / "a.safetensors", trained.agent())
     begun = trainer_of(CONFIG.replace(init=tmp_path / "a.safetensors"), seed=5)
-    wanted = load_agent(tmp_path / "a.safetensors", (Bilinear,)).network
+    wanted = load_agent(tmp_path / "a.safetensors").network
     for layer, weights in zip(begun.policy[::2], wanted.weights, strict=True):
         np.testing.assert_array_equal(layer.weight.detach(), weights)
     for other in ({"hidden": (3,)}, {"offsets": (1, 5)}, {"damping": 1e-3}):
