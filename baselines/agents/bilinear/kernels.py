@@ -1,14 +1,100 @@
-"""Kernels of the law of the bilinear agent."""
+"""Kernels of the law of the bilinear agent, and of the damped inverse that its network tunes.
+
+With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
+damping, which the network gives beside G and h,
+
+    G' = G + U Jᵀ (J U Jᵀ + λ I)⁻¹
+
+replaces G (weighted damped least squares, as in Nakamura and Hanafusa 1986), and its projection into the null space,
+h' = (I - G' J) h, replaces h. An output holds G and h, then ln λ relative to the initial λ, then ln U; both logarithms
+are clipped at ±:data:`LARGEST`.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from baselines.agents.bilinear.damped_kernels import held_rows
-from baselines.agents.bilinear.features import feature_rows, mean_twists, metric_rows
+from baselines.agents.bilinear.features import feature_rows, mean_twists, metric_rows, seen_jacobian
 from baselines.agents.network import forward_rows
+from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
+
+#: Bound of the logarithms.
+LARGEST = 6.0
+
+
+@kernel
+def held_rows(kind, chain, damping, q, output, out):
+    """(G', h'), row by row.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm.
+        damping: The initial λ, above 0.
+        q: Shape (B, n).
+        output: Of the network. Shape (B, n (w + 1) + 1 + n).
+        out: Receives (G', h'), float64. Shape (B, n (w + 1)).
+    """
+    n, w = q.shape[1], twist_size(kind)
+    jacobian, metric, products, moved = np.empty((6, n)), np.empty(n), np.empty((w, n)), np.empty(w)
+    for row in range(q.shape[0]):
+        given, held = output[row], out[row]
+        invert(kind, chain, damping, q[row], given[n * (w + 1) :], jacobian, metric, products)
+        for a in range(w):  # J h, the motion of the tool that h alone causes
+            moved[a] = 0.0
+            for j in range(n):
+                moved[a] += jacobian[a, j] * given[j * (w + 1) + w]
+        for j in range(n):
+            own = j * (w + 1)
+            held[own + w] = given[own + w]
+            for a in range(w):
+                held[own + a] = given[own + a] + metric[j] * products[a, j]
+                held[own + w] -= held[own + a] * moved[a]
+
+
+@inner
+def invert(kind, chain, damping, q, given, jacobian, metric, products):
+    """The damped inverse of one arm; an output that is NaN leads to NaN.
+
+    Args:
+        kind: Of task coordinates.
+        chain: The arm.
+        damping: The initial λ.
+        q: Shape (n,).
+        given: ln λ relative to the initial one, and ln U. Shape (1 + n,).
+        jacobian: Receives J, see :func:`baselines.agents.bilinear.features.seen_jacobian`. Shape (6, n).
+        metric: Receives the diagonal of U. Shape (n,).
+        products: Receives (J U Jᵀ + λ I)⁻¹ J. Shape (w, n).
+    """
+    w, n = products.shape
+    scaled, factor, inverse = np.empty((w, n)), np.empty((w, w)), np.empty((w, w))
+    seen_jacobian(kind, chain, q, np.empty(n), np.empty((3, 3)), np.empty(3), jacobian)
+    lambda_ = damping * from_logarithm(given[0])
+    for j in range(n):
+        metric[j] = from_logarithm(given[1 + j])
+        root = math.sqrt(metric[j])
+        for a in range(w):
+            scaled[a, j] = jacobian[a, j] * root
+    damped_gram(scaled, lambda_, factor)
+    if ldl(factor):
+        ldl_scaled_inverse(factor, 1.0, inverse)
+    else:
+        inverse[:] = np.nan
+    for a in range(w):
+        for j in range(n):
+            total = 0.0
+            for b in range(w):
+                total += inverse[a, b] * jacobian[b, j]
+            products[a, j] = total
+
+
+@inlined
+def from_logarithm(number):
+    """The number whose logarithm is an output."""
+    return math.exp(min(max(number, -LARGEST), LARGEST))
 
 
 @inner
@@ -52,7 +138,7 @@ def law_rows(scene, damping, velocity_limit, network, batch, interval, held, lef
 
     Args:
         scene: Kind of task coordinates, the arm, Δt in [s], and the offsets.
-        damping: See :func:`baselines.agents.bilinear.damped_kernels.held_rows`.
+        damping: See :func:`held_rows`.
         velocity_limit: Shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference at the offsets and steps left. Shape (B, …).

@@ -9,14 +9,16 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
 from baselines.agents.bilinear.features import feature_rows, metric_rows
+from baselines.agents.bilinear.kernels import LARGEST
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
+from baselines.training.gradients.jacobian import jacobian_gradient_rows, jacobian_rows
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
+from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -76,7 +78,7 @@ class Law:
         return torch.from_numpy(out), speed
 
     def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
-        """(G, h) from the output of the network.
+        """(G, h) from the output of the network, as :func:`baselines.agents.bilinear.kernels.held_rows` gives them.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -86,8 +88,18 @@ class Law:
         Returns:
             Shape (N, n (w + 1)), float64.
         """
-        out: Tensor = _Held.apply(q, output, features, self)  # type: ignore[no-untyped-call]
-        return out
+        shift = np.zeros(output.shape)
+        metric_rows(self.task.kind, self.chain.prismatic, len(self._offsets) - 1, features.numpy(), shift)
+        n, w = q.shape[1], twist_size(self.task.kind)
+        given, lambda_, metric = torch.split(output + torch.from_numpy(shift), [n * (w + 1), 1, n], dim=1)
+        lambda_, metric = (self._damping * from_logarithm(lambda_))[:, :, None], from_logarithm(metric)
+        matrix, null = torch.split(given.view(-1, n, w + 1), [w, 1], dim=2)
+        jacobian: Tensor = _Jacobian.apply(q, self)  # type: ignore[no-untyped-call]
+        jacobian = jacobian[:, :w]
+        weighted = (jacobian * metric[:, None]).transpose(1, 2)
+        gram = jacobian @ weighted + lambda_ * torch.eye(w, dtype=q.dtype)
+        matrix = matrix + weighted @ torch.linalg.inv_ex(gram).inverse  # without an error where a number is NaN
+        return torch.cat([matrix, null - matrix @ (jacobian @ null)], dim=2).flatten(1)
 
     def move(self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows) -> tuple[Tensor, Tensor, Tensor, FloatArray]:
         """A segment of steps, see :func:`baselines.training.gradients.segment.segment`.
@@ -107,25 +119,26 @@ class Law:
         return *ends, path.distance
 
 
-class _Held(torch.autograd.Function):
+def from_logarithm(number: Tensor) -> Tensor:
+    """The numbers whose logarithms are an output, which is clipped."""
+    return number.clamp(-LARGEST, LARGEST).exp()
+
+
+class _Jacobian(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, q: Tensor, output: Tensor, features: Tensor, law: Law) -> Tensor:
-        joints, given = q.detach().numpy(), output.detach().numpy().copy()
-        task, n = law.task, joints.shape[1]
-        metric_rows(task.kind, law.chain.prismatic, len(law._offsets) - 1, features.numpy(), given)
-        out = np.empty((len(joints), given.shape[1] - 1 - n))
-        held_rows(task.kind, law.chain, law._damping, joints, given, out)
-        ctx.law, ctx.given = law, (joints, given)
+    def forward(ctx: Any, q: Tensor, law: Law) -> Tensor:
+        out = np.empty((len(q), 6, q.shape[1]))
+        jacobian_rows(law.task.kind, law.chain, q.detach().numpy(), out)
+        ctx.law, ctx.jacobian = law, out
         return torch.from_numpy(out)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None, None]:
-        law, (joints, given) = ctx.law, ctx.given
-        by_output, by_q = np.empty(given.shape), np.empty(joints.shape)
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        law, out = ctx.law, np.empty(ctx.jacobian.shape[::2])
         by = np.ascontiguousarray(gradient.numpy())
-        held_gradient_rows(law.task.kind, law.chain, law._damping, joints, given, by, by_output, by_q)
-        return torch.from_numpy(by_q), torch.from_numpy(by_output), None, None
+        jacobian_gradient_rows(law.task.kind, law.chain, ctx.jacobian, by, out)
+        return torch.from_numpy(out), None
 
 
 class _Segment(torch.autograd.Function):

@@ -2,14 +2,10 @@
 
 import numpy as np
 import pytest
-import torch
 
-from baselines.agents.bilinear.damped_kernels import held_rows
 from baselines.agents.bilinear.features import FARTHEST, metric_rows, rate_rows
+from baselines.agents.bilinear.kernels import held_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.policy import Problem
-from baselines.training.gradients.law import Law
-from ikgym import scenarios
 from ikgym.rl.twists import twist
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, features, problem_of, qdot
 from tests.baselines.random_agents import network, nothing_held
@@ -66,19 +62,6 @@ def test_nan_is_not_taken_for_a_step():
     rate_rows(problem.task.kind, problem.model.chain, problem.dt, np.array(OFFSETS), *arrays)
     assert np.isnan(out[1]).all()
     assert np.isfinite(np.delete(out, 1, axis=0)).all()
-
-
-def test_features_are_constants_for_the_gradient_and_actions_are_not():
-    scenario = scenarios.get("varga7-pose-random")
-    law, problem = Law(scenario, DAMPED), Problem.of(scenario)
-    batch, speeds = batch_of(problem), np.empty(ROWS)
-    q = torch.from_numpy(batch.q).requires_grad_()
-    seen, speed = law.features(q, batch.nominal, batch.remaining)
-    assert not seen.requires_grad
-    wanted = features(problem, batch, speeds)
-    np.testing.assert_array_equal(seen.numpy().astype(np.float32), wanted)
-    np.testing.assert_array_equal(speed, speeds)
-    assert law.held(q, seen, torch.zeros(ROWS, law.outputs, dtype=torch.float64)).requires_grad
 
 
 @pytest.mark.parametrize(("arm", "task"), CASES)
