@@ -6,14 +6,16 @@ import dataclasses
 import hashlib
 import json
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 from safetensors.numpy import load, save
 
 import ikgym
+from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.network import Network
 from baselines.agents.processing import Processing
+from baselines.agents.track import Track
 from baselines.canonical import canonical
 from baselines.files import ResultsError, read_bytes, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
@@ -29,6 +31,8 @@ KEY: Final = "ikgym"
 MOST_BYTES = 2**28
 #: Digits of a hash that identify an agent in results.
 DIGITS = 12
+#: The kinds of agents by the names that files have for them.
+KINDS: Final[Mapping[str, type[Processing]]] = {kind.kind: kind for kind in (Bilinear, Track)}
 #: Strings and numbers that every file contains.
 _PARTS: Final = {
     "scenario": ("name", "fingerprint"),
@@ -115,21 +119,17 @@ def save_agent(file: pathlib.Path, agent: AgentFile) -> str:
     return agent.hash
 
 
-def load_agent(file: pathlib.Path, kinds: Sequence[type[Processing]]) -> AgentFile:
+def load_agent(file: pathlib.Path) -> AgentFile:
     """Reads the file of an agent.
-
-    Args:
-        file: The file.
-        kinds: The kinds of agents that are accepted.
 
     Raises:
         ResultsError: There is no such file, it is damaged, or it has another format.
     """
     with reading(file):
-        return _parsed(str(file), read_bytes(file, MOST_BYTES), {kind.kind: kind for kind in kinds})
+        return _parsed(str(file), read_bytes(file, MOST_BYTES))
 
 
-def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) -> AgentFile:
+def _parsed(source: str, content: bytes) -> AgentFile:
     """The agent in the content of a file."""
     tensors = load(content)
     header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
@@ -141,12 +141,12 @@ def _parsed(source: str, content: bytes, kinds: Mapping[str, type[Processing]]) 
     if not isinstance(described, dict):
         raise ValueError(f"processing: expected a table, got {described!r}")
     kind: Any = described.get("kind")
-    if kind not in kinds:
-        raise ResultsError(f"{source}: expected an agent of the kind {' or '.join(kinds)}, got {kind!r}.")
+    if kind not in KINDS:
+        raise ResultsError(f"{source}: expected an agent of the kind {' or '.join(KINDS)}, got {kind!r}.")
     for part, names in _PARTS.items():
         if not all(isinstance(about[part][name], (str, int)) for name in names):
             raise ValueError(f"{part}: expected {', '.join(names)}, got {about[part]!r}")
-    processing = kinds[kind].from_json(described)
+    processing = KINDS[kind].from_json(described)
     network = Network.from_json(about["network"], tensors)
     found = _digest(network, about)
     if found != claimed:

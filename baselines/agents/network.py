@@ -20,7 +20,7 @@ Singles = npt.NDArray[np.float32]
 #: The tensors of a layer.
 PARTS = ("weight", "bias")
 #: Activations between the layers; the kernel knows them by their index.
-ACTIVATIONS = ("linear", "relu", "tanh", "silu", "elu")
+ACTIVATIONS = ("relu", "tanh", "silu", "elu")
 #: Functions that limit the outputs of the last layer to [-1, 1]; linear leaves them unchanged.
 SQUASHES = ("clip", "tanh", "linear")
 
@@ -98,7 +98,9 @@ class Network(Frozen):
         expected: dict[str, tuple[int, ...]] = {}
         for k, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
             expected |= {f"layers.{k}.weight": (outputs, inputs), f"layers.{k}.bias": (outputs,)}
-        check_tensors(tensors, expected)
+        got = {name: tensor.shape for name, tensor in tensors.items()}
+        if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):
+            raise InvalidInputError(f"tensors: expected float32 of the shapes {expected}, got {got}.")
         weights, biases = ([tensors[f"layers.{k}.{part}"] for k in range(len(sizes) - 1)] for part in PARTS)
         return cls(tuple(weights), tuple(biases), about["activation"], about["squash"])
 
@@ -121,19 +123,6 @@ class Network(Frozen):
         out = np.empty((len(features), self.sizes[-1]), dtype=np.float32)
         forward_rows(*self.constants, np.ascontiguousarray(features), out)
         return out
-
-
-def check_tensors(tensors: Mapping[str, npt.NDArray[Any]], expected: Mapping[str, tuple[int, ...]]) -> None:
-    """Checks names, shapes, types and finiteness of tensors.
-
-    Raises:
-        InvalidInputError: A tensor is not as expected.
-    """
-    got = {name: tensor.shape for name, tensor in tensors.items()}
-    if got != expected or any(tensor.dtype != np.float32 for tensor in tensors.values()):
-        raise InvalidInputError(f"tensors: expected float32 of the shapes {dict(expected)}, got {got}.")
-    if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
-        raise InvalidInputError("tensors: expected finite numbers, got NaN or infinity.")
 
 
 def _layers(name: str, arrays: Sequence[npt.ArrayLike], axes: int) -> tuple[Singles, ...]:

@@ -5,20 +5,18 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bounds import Bounds
+from baselines.agents.bounds import keep_rows
 from baselines.agents.files import AgentFile, load_agent
-from baselines.agents.processing import Held, Processing
-from baselines.agents.track import Track
+from baselines.agents.processing import Held
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.wrappers import full_orientation
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
@@ -64,8 +62,8 @@ class LearnedPolicy(SolverPolicy):
     file: AgentFile = dataclasses.field(init=False, repr=False)
     #: The problem as the agent sees it: with whole poses if it was trained on them.
     seen: Problem = dataclasses.field(init=False, repr=False)
-    #: Bounds of joint velocities that respect the limits of the arm; None if it has none, or the agent ignores them.
-    bounds: Bounds | None = dataclasses.field(init=False, repr=False)
+    #: Limits that actions keep, see :func:`keep_rows`; None if the arm has none, or the agent ignores them.
+    limits: FloatArray | None = dataclasses.field(init=False, repr=False)
 
     grain: ClassVar[int] = 32
 
@@ -95,8 +93,8 @@ class LearnedPolicy(SolverPolicy):
             )
         trained = processing.interval
         steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
-        bounds = Bounds.of(seen) if processing.bounded else None
-        for field, value in {"file": file, "seen": seen, "bounds": bounds, "interval": steps}.items():
+        limits = limits_with_braking(seen) if processing.bounded and seen.model.limited else None
+        for field, value in {"file": file, "seen": seen, "limits": limits, "interval": steps}.items():
             object.__setattr__(self, field, value)
 
     @property
@@ -130,8 +128,8 @@ class LearnedPolicy(SolverPolicy):
         processing, network = self.file.processing, self.file.network
         assert self.interval is not None
         fractions = processing.act(self.seen, batch, network, self.interval, held)
-        if self.bounds is not None:
-            self.bounds.keep(batch, fractions)
+        if self.limits is not None:
+            keep_rows(self.limits, self.seen.dt, self.seen.velocity_limit, batch.q, batch.qdot, fractions)
         rows = len(fractions)
         after = AgentMemory(*held, *orientation)
         return Solution(fractions * self.problem.velocity_limit, after, statuses(rows), np.ones(rows, dtype=np.int64))
@@ -165,7 +163,7 @@ class Agent(LearnedPolicy):
 
     def __post_init__(self, given: AgentFile | None) -> None:
         flag("any_arm", self.any_arm)
-        file = given or agent_at(self.path, self.hash, (Bilinear, Track))
+        file = given or agent_at(self.path, self.hash)
         self._take(file, any_arm=self.any_arm)
         object.__setattr__(self, "path", os.fspath(self.path))
         object.__setattr__(self, "hash", file.digits)
@@ -190,7 +188,7 @@ class AgentAlone(LearnedPolicy):
     name: ClassVar[str] = "agent_alone"
 
     def __post_init__(self) -> None:
-        file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash, (Bilinear, Track))
+        file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash)
         self._take(dataclasses.replace(file, source=self.name))
 
 
@@ -212,13 +210,12 @@ class AgentTrack(AgentAlone):
     name: ClassVar[str] = "agent_track"
 
 
-def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[type[Processing]]) -> AgentFile:
+def agent_at(path: str | os.PathLike[str], digits: str | None) -> AgentFile:
     """The agent of a file.
 
     Args:
         path: The file; ``~`` stands for the home of the user.
         digits: The first digits of its hash; None for any.
-        kinds: The kinds of agents that are accepted.
 
     Raises:
         ResultsError: The file cannot be read.
@@ -226,7 +223,7 @@ def agent_at(path: str | os.PathLike[str], digits: str | None, kinds: Sequence[t
     """
     if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
         raise ResultsError(f"path: expected the file of an agent, got {path!r}.")
-    agent = load_agent(pathlib.Path(os.path.expanduser(path)), kinds)  # noqa: PTH111  # never raises, unlike Path's
+    agent = load_agent(pathlib.Path(os.path.expanduser(path)))  # noqa: PTH111  # never raises, unlike Path's
     if digits is not None and not (isinstance(digits, str) and digits == agent.digits):
         raise InvalidInputError(f"hash: expected {agent.digits}, the hash of {path}, got {digits!r}.")
     return agent

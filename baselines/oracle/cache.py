@@ -73,7 +73,7 @@ def solve(
     if known is not None:
         return known
     true, plain = stripped(scenario, seed, arm_seed), ideal(scenario, seed)
-    if _same(true, plain):
+    if fingerprint(true) == fingerprint(plain):
         optimum = search(true, seed, how, tick, paths)
     else:
         best = solve(plain, seed, how, cached=cached, tick=tick).q
@@ -86,7 +86,7 @@ def solve(
 
 def kept(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> Optimum | None:
     """The optimum of an episode on disk, see :func:`solve`; None if there is none."""
-    known = _read(_place(scenario, seed, how, arm_seed))
+    known = _read(file_of(scenario, seed, how, arm_seed))
     # The name is not part of the content.
     return None if known is None else known.replace(scenario=scenario.name)
 
@@ -94,18 +94,9 @@ def kept(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None
 def keep(optimum: Optimum, scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> None:
     """Writes an optimum where :func:`kept` looks for it; where that cannot be done, a warning says so."""
     try:
-        write(_place(scenario, seed, how, arm_seed), _packed(optimum))
+        write(file_of(scenario, seed, how, arm_seed), _packed(optimum))
     except ResultsError as e:
         logger.warning("The optimum is not kept: %s", e)
-
-
-def _place(scenario: Scenario, seed: int, how: Search, arm_seed: int | None) -> pathlib.Path:
-    true = stripped(scenario, seed, arm_seed)
-    return file_of(true, seed, how, polished=not _same(true, ideal(scenario, seed)))
-
-
-def _same(one: Scenario, other: Scenario) -> bool:
-    return fingerprint(one) == fingerprint(other)
 
 
 def folder() -> pathlib.Path:
@@ -122,12 +113,13 @@ def folder() -> pathlib.Path:
     return base / "ikgym"
 
 
-def file_of(scenario: Scenario, seed: int, how: Search, *, polished: bool = False) -> pathlib.Path:
+def file_of(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> pathlib.Path:
     """The file of an optimum: named by the content of the episode, the search, and the version of its code.
 
-    ``polished`` says that the search was that of the episode with an ideal plant, whose path was polished.
+    Where the arm is not that of the data sheet, the content is that of the episode with an ideal plant, too.
     """
-    what = canonical([episode_hash(scenario, seed), dataclasses.asdict(how), VERSION, *["moved, polished"] * polished])
+    episodes = [episode_hash(one, seed) for one in (stripped(scenario, seed, arm_seed), ideal(scenario, seed))]
+    what = canonical([*dict.fromkeys(episodes), dataclasses.asdict(how), VERSION])
     return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"
 
 

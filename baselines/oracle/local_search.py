@@ -37,12 +37,10 @@ class Improved(NamedTuple):
     Attributes:
         costs: Their costs. Shape (S,).
         gradients: Norms of the gradient by q, in [1/rad] or [1/m]. Shape (S,).
-        steps: Newton steps made. Shape (S,).
     """
 
     costs: npt.NDArray[np.float64]
     gradients: npt.NDArray[np.float64]
-    steps: npt.NDArray[np.float64]
 
 
 @kernel
@@ -72,8 +70,7 @@ def improve(problem, settings, paths, improved, first, last):
         before[:] = path
         worst = cost_within(problem, path, SLACK, workspace)
         multipliers[:] = 0.0
-        minimum = minimise_path(problem, path, multipliers, settings, 0.0, workspace)
-        improved.steps[s], improved.gradients[s] = minimum.steps, minimum.gradient_norm
+        improved.gradients[s] = minimise_path(problem, path, multipliers, settings, 0.0, workspace).gradient_norm
         costs[s] = cost_within(problem, path, SLACK, workspace)
         if not costs[s] <= worst:
             path[:] = before

@@ -55,19 +55,13 @@ class Start:
 
     Args:
         kind: Where the path came from, in words.
-        number: Of a random start.
         coarse: Its cost on the coarse grid; None where it was not tried there.
         cost: Its cost in the environment, polished at full resolution; None where it was not worth that.
-        gradient_norm: Norm of the cost's gradient there, by q / Δt, in [s/rad] or [s/m].
-        newton_steps: Newton steps at full resolution.
     """
 
     kind: str
-    number: int | None = None
     coarse: float | None = None
     cost: float | None = None
-    gradient_norm: float | None = None
-    newton_steps: int | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -20,8 +20,8 @@ from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-#: Raised by whoever changes what the search finds: what was kept on disk before counts no more.
-VERSION = 2
+#: Raised by whoever changes what the search finds, or the fields of an optimum: older files count no more.
+VERSION = 3
 #: Receding horizons whose paths are starts, too.
 HORIZONS: tuple[Mapping[str, Any], ...] = (
     {"horizon": 1001, "move_blocks": 48, "iterations": 1, "starts": 64, "restart_steps": 10, "stop_at_end": True},
@@ -104,7 +104,7 @@ def _coarse_search(
     in_chunks(
         lambda first, last: local_search.random_paths(problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
     )
-    (costs, _, _), _ = improved(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
+    (costs, _), _ = improved(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
     done(0.3)
 
     chosen = _distinct(costs, PARTNERS)
@@ -122,10 +122,7 @@ def _coarse_search(
     paths, costs = np.concatenate([paths, chains[better]]), np.concatenate([costs, reached[better]])
 
     kinds = [*known, *[RANDOM] * how.starts, *[LOCAL_SEARCH] * int(better.sum())]
-    starts = [
-        Start(kind, number - len(known) + 1 if kind == RANDOM else None, cost)
-        for number, (kind, cost) in enumerate(zip(kinds, costs.tolist(), strict=True))
-    ]
+    starts = [Start(kind, cost) for kind, cost in zip(kinds, costs.tolist(), strict=True)]
     best = [number for number in _distinct(costs, how.polished) if number >= len(known)]
     return starts, {number: episode.refined(grid, paths[number]) for number in best}
 
@@ -168,10 +165,8 @@ def finished(
     gains, spent = improved(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
     played = [_played(episode, path) for path in polished]
     gradients, reached = gains.gradients * episode.scenario.dt, list(starts)
-    for number, (_, _, cost), gradient, steps in zip(paths, played, gradients, gains.steps, strict=True):
-        reached[number] = dataclasses.replace(
-            reached[number], cost=cost, gradient_norm=float(gradient), newton_steps=int(steps)
-        )
+    for number, (_, _, cost) in zip(paths, played, strict=True):
+        reached[number] = dataclasses.replace(reached[number], cost=cost)
     best = int(np.argmin([cost for _, _, cost in played]))
     q, qdot, cost = played[best]
     done(0.1)
@@ -192,7 +187,7 @@ def improved(
     episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
 ) -> tuple[local_search.Improved, float]:
     """Improves paths in place, in several threads; gives what became of them, and the CPU time in [s]."""
-    out, problem = local_search.Improved(*np.empty((3, len(paths)))), episode.on(grid)
+    out, problem = local_search.Improved(*np.empty((2, len(paths)))), episode.on(grid)
     spent: list[float] = []
 
     def work(first: int, last: int) -> None:

@@ -74,7 +74,8 @@ def find_all(
         return
     left = []
     for one in wanted:
-        known = _kept(one)
+        on_disk = one.cached and not one.policies
+        known = kept(one.scenario, one.draw.seed, one.how, one.draw.arm_seed) if on_disk else None
         if known is None:
             left.append(one)
         else:
@@ -107,13 +108,6 @@ def check_policies(wanted: Sequence[Wanted]) -> None:
 def _made(scenario: Scenario, spec: str) -> SolverPolicy:
     name, parameters = parse_policy(spec)
     return registry.make(name, scenario, **parameters)
-
-
-def _kept(one: Wanted) -> Optimum | None:
-    """Optima on the disk of this machine."""
-    if not one.cached or one.policies:
-        return None
-    return kept(one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
 
 
 def _check(one: Wanted, optimum: Optimum) -> None:

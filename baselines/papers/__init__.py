@@ -5,15 +5,13 @@ from __future__ import annotations
 from baselines.papers.faitli import claims as faitli_claims
 from baselines.papers.faitli.figures import FIGURES as FAITLI_FIGURES
 from baselines.papers.khan import claims as khan_claims
-from baselines.papers.khan import section_2 as khan_section_2
-from baselines.papers.khan import section_5 as khan_section_5
+from baselines.papers.khan import without_jacobian
 from baselines.papers.khan.figures import FIGURES as KHAN_FIGURES
 from baselines.papers.paper import Paper, claims_of
 from baselines.papers.varga import claims as varga_claims
 from baselines.papers.varga.figures import FIGURES as VARGA_FIGURES
 from baselines.papers.zhang import claims as zhang_claims
-from baselines.papers.zhang import section_4 as zhang_section_4
-from baselines.papers.zhang import section_5 as zhang_section_5
+from baselines.papers.zhang import predictive
 from baselines.papers.zhang.figures import FIGURES as ZHANG_FIGURES
 from ikgym.validation import known_name
 
@@ -26,8 +24,8 @@ _TITLES = {
 _CLAIMS = {
     "varga": claims_of(varga_claims),
     "faitli": claims_of(faitli_claims),
-    "khan": claims_of(khan_claims, khan_section_2, khan_section_5),
-    "zhang": claims_of(zhang_claims, zhang_section_4, zhang_section_5),
+    "khan": claims_of(khan_claims, without_jacobian),
+    "zhang": claims_of(zhang_claims, predictive),
 }
 _FIGURES = {"varga": VARGA_FIGURES, "faitli": FAITLI_FIGURES, "khan": KHAN_FIGURES, "zhang": ZHANG_FIGURES}
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from baselines.recording import Episode
 from ikgym.validation import FloatArray
 
 #: "More", "smaller", "degraded": a difference of a tenth of the larger value. "Significantly", "considerably": a factor
@@ -41,6 +42,16 @@ def below(values: Mapping[str, float], limit: float) -> dict[str, bool]:
 def falls(pairs: Mapping[str, tuple[float, float]]) -> dict[str, bool]:
     """Whether a value falls, from before to after, in the conditions in which it changes by a tenth or more."""
     return {name: after < before for name, (before, after) in pairs.items() if differ(before, after)}
+
+
+def largest_error(episode: Episode) -> float:
+    """The largest position error of an episode in [m]."""
+    return float(episode.position_error.max())
+
+
+def peak_speed(episode: Episode) -> float:
+    """The largest speed of a joint in an episode in [rad/s] or [m/s]."""
+    return float(np.abs(episode.qdot).max())
 
 
 def extent(path: FloatArray) -> float:

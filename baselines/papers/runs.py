@@ -13,7 +13,9 @@ from baselines.fingerprints import episode_hash
 from baselines.recording import Episode
 from baselines.registry import make
 from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 
 class Runs:
@@ -50,3 +52,20 @@ class Runs:
             with bar, threadpool_limits(limits=1):
                 self._episodes[key] = rollout(what, make(policy, what, **parameters), 0, tick=bar.update)
         return self._episodes[key]
+
+
+def times(scenario: Scenario) -> FloatArray:
+    """Times at the end of each step, in [s]. Shape (steps,)."""
+    return scenario.times(scenario.steps + 1)[1:]
+
+
+def nominal_joints(scenario: Scenario) -> FloatArray:
+    """The joint coordinates that generate the nominal path, in [rad] or [m]. Shape (steps, n).
+
+    Raises:
+        InvalidInputError: The scenario has no such path.
+    """
+    path = scenario.nominal_joint_path()
+    if path is None:
+        raise InvalidInputError(f"scenario {scenario.name!r} has no joint path to compare with.")
+    return path[1:]

@@ -16,6 +16,7 @@ import tyro
 from baselines.agents.bilinear.processing import Bilinear
 from ikgym import rl, scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.kernels.tasks import SKEW
 from ikgym.scenarios import Scenario
 from ikgym.validation import Frozen, flag, known_names, number, whole_number
 
@@ -23,7 +24,7 @@ Activation = Literal["silu", "relu", "tanh", "elu"]
 
 #: Upper bounds, so that a typing error gives a message and does not exhaust the memory.
 MOST_ARMS, MOST_LAYERS, MOST_NEURONS = 10_000, 10, 2048
-MOST_WINDOW = 10_000
+MOST_STAGES, MOST_WINDOW = 100, 10_000
 MOST_RATE = 1e30  # weights are float32
 
 
@@ -35,7 +36,7 @@ class TrainingError(IkgymError):
 class APG(Frozen):
     """Analytic policy gradient: back-propagation of the cost through the arm, over windows of some steps.
 
-    The agent is bilinear: its network gives the matrix that maps the remaining twist to joint velocities.
+    The agent is bilinear: its network tunes the matrix that maps the remaining twist to joint velocities.
 
     Raises:
         UnknownNameError: There is no such scenario, activation or the like.
@@ -46,19 +47,15 @@ class APG(Frozen):
     method: ClassVar[str] = "apg"
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-random"
-    """The scenario to train on. Random scenarios are trained on seeds of the split "train"."""
+    """The scenario to train on. Random scenarios are trained on seeds of the split "train". If it shows skew
+    coordinates, whose errors are no twists, the agent is trained on whole poses; it resolves the 90° ambiguity."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Largest number of steps of an episode, in training and validation, for short trials. That of the scenario if left
     out."""
-    task: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Task coordinates to train on, if not those of the scenario. An agent trained on whole poses (pose) also plays
-    scenarios that show skew coordinates, whose 90° ambiguity is resolved for it."""
     offsets: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = Bilinear.offsets
     """Steps ahead at which the agent sees the reference trajectory, rising from 1."""
-    damping: Annotated[float | None, tyro.conf.arg(metavar="λ")] = None
-    """Start from the damped inverse of the Jacobian with this λ; the network adjusts it and adds to it, and sees the
-    joint rates that the reference ahead requires. If left out, the network gives the whole matrix. Not for skew
-    coordinates."""
+    damping: Annotated[float, tyro.conf.arg(metavar="λ")] = Bilinear.damping
+    """λ of the damped inverse of the Jacobian with which the training starts; the network adjusts it and adds to it."""
     hidden: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (256, 256)
     """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
     activation: Activation = "silu"
@@ -105,32 +102,29 @@ class APG(Frozen):
     those of that run."""
 
     def __post_init__(self) -> None:
-        self._whole("segments", "evaluate_every", "hold", "segment_steps")
-        self._whole("validation_episodes", at_most=len(scenarios.SPLITS["validation"]))
-        self._whole("n_envs", at_most=MOST_ARMS)
+        self._settle_by(whole_number, "segments", "evaluate_every", "hold", "segment_steps", at_least=1)
+        self._settle_by(whole_number, "validation_episodes", at_least=1, at_most=len(scenarios.SPLITS["validation"]))
+        self._settle_by(whole_number, "n_envs", at_least=1, at_most=MOST_ARMS)
         if self.steps is not None:
-            self._whole("steps")
+            self._settle_by(whole_number, "steps", at_least=1)
         flag("keep_best", self.keep_best)
         known_names("activation", [self.activation], get_args(Activation))
-        if not isinstance(self.hidden, tuple) or not 1 <= len(self.hidden) <= MOST_LAYERS:
-            raise InvalidInputError(f"hidden: expected 1 to {MOST_LAYERS} layers, got {self.hidden!r}.")
-        self._whole("hidden", at_most=MOST_NEURONS)
-        self._numbers("learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)
-        self._set("offsets", self.processing.offsets)
-        self._set("damping", self.processing.damping)
+        self._settle_by(_whole_numbers, "hidden", most=MOST_LAYERS, at_most=MOST_NEURONS)
+        self._settle_by(number, "learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)
+        self._settle(offsets=self.processing.offsets, damping=self.processing.damping)
         if self.init is not None:
-            self._set("init", pathlib.Path(self.init))
-        if not isinstance(self.window, tuple) or not self.window:
-            raise InvalidInputError(f"window: expected whole numbers, got {self.window!r}.")
-        self._whole("window", at_most=MOST_WINDOW)
+            self._settle(init=pathlib.Path(self.init))
+        self._settle_by(_whole_numbers, "window", most=MOST_STAGES, at_most=MOST_WINDOW)
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:
                 raise InvalidInputError(
                     f"window: expected multiples of hold, {self.hold}, that divide segment_steps, "
                     f"{self.segment_steps}, got {steps}."
                 )
-        self._numbers("max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0)
-        self._numbers("averaging", at_least=0.0, at_most=1.0)
+        self._settle_by(
+            number, "max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0
+        )
+        self._settle_by(number, "averaging", at_least=0.0, at_most=1.0)
 
     @property
     def processing(self) -> Bilinear:
@@ -155,14 +149,14 @@ class APG(Frozen):
         return float(self.learning_rate * (self.learning_rate_end / self.learning_rate) ** part)
 
     def make_scenario(self) -> Scenario:
-        """The scenario with the options `task` and `steps` applied.
+        """The scenario, with whole poses in place of skew coordinates, and no more than `steps`.
 
         Raises:
-            UnknownNameError: There is no such scenario or task.
+            UnknownNameError: There is no such scenario.
         """
         scenario = scenarios.get(self.scenario)
-        if self.task is not None:
-            scenario = scenario.replace(task=tasks.get(self.task))
+        if scenario.task.kind == SKEW:
+            scenario = scenario.replace(task=tasks.get("pose"))
         return scenario if self.steps is None else scenario.replace(steps=min(self.steps, scenario.steps))
 
     def to_json(self) -> dict[str, Any]:
@@ -183,23 +177,12 @@ class APG(Frozen):
         converted: Any = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
         return cls(**converted)
 
-    def _whole(self, *names: str, at_least: int = 1, at_most: int | None = None) -> None:
-        """Checks whole numbers, single or in a tuple, and stores them as int."""
-        for name in names:
-            value = getattr(self, name)
-            several = isinstance(value, tuple)
-            each = value if several else (value,)
-            checked = tuple(whole_number(name, one, at_least=at_least, at_most=at_most) for one in each)
-            self._set(name, checked if several else checked[0])
 
-    def _numbers(self, *names: str, **bounds: float) -> None:
-        """Checks real numbers and stores them as floats."""
-        for name in names:
-            self._set(name, number(name, getattr(self, name), **bounds))
-
-    def _set(self, field: str, value: object) -> None:
-        """Sets a field while this frozen object is initialised."""
-        object.__setattr__(self, field, value)
+def _whole_numbers(name: str, values: object, *, most: int, at_most: int) -> tuple[int, ...]:
+    """A tuple of 1 to `most` whole numbers from 1."""
+    if not isinstance(values, tuple) or not 1 <= len(values) <= most:
+        raise InvalidInputError(f"{name}: expected 1 to {most} whole numbers, got {values!r}.")
+    return tuple(whole_number(name, one, at_least=1, at_most=at_most) for one in values)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import math
 import pathlib
@@ -28,22 +27,13 @@ from baselines.training.config import APG, TrainingError
 from baselines.training.folder import FORMAT, Checkpoint, Folder
 from baselines.training.randomness import deterministic_torch, reseed
 from baselines.training.trainer import SegmentMetrics, Trainer
-from baselines.training.validation import Score, bound, validate
+from baselines.training.validation import Score, bound, validated
 
 #: Weights above this have diverged.
 LARGEST = 1e9
 
 #: Called after each segment with the number of segments done, and the score if there was a validation.
 OnSegment = Callable[[int, Score | None], object]
-
-
-@dataclasses.dataclass(frozen=True)
-class Result:
-    """The result of a run: its folder, the SHA-256 of the final weights, and the score of the kept agent."""
-
-    folder: pathlib.Path
-    weights_sha256: str
-    score: Score
 
 
 def train(
@@ -56,8 +46,8 @@ def train(
     checkpoint_every: float = 0.0,
     command: str = "baselines.training.run.train(…)",
     on_segment: OnSegment | None = None,
-) -> Result:
-    """Trains an agent.
+) -> dict[str, Any]:
+    """Trains an agent; returns the content of `run.json`.
 
     Args:
         config: The options.
@@ -114,7 +104,7 @@ class _Run:
                     self._trainer.restore(self._at.trainer)
         write_json(self._folder.run, self._content())
 
-    def go(self, checkpoint_every: float, on_segment: OnSegment | None) -> Result:
+    def go(self, checkpoint_every: float, on_segment: OnSegment | None) -> dict[str, Any]:
         # A killed run may have logged rows after its last checkpoint, which are purged.
         purge = self._trainer.steps + 1 if self._at.history else None
         with SummaryWriter(str(self._folder.tensorboard), purge_step=purge) as board:
@@ -155,7 +145,7 @@ class _Run:
         row.update({name: value for name, value in metrics.items() if math.isfinite(value)})
         score = None
         if done % config.evaluate_every == 0 or done == config.segments:
-            score = validate(trainer.agent(), self._scenario, config.validation_episodes)
+            score = validated(bound(trainer.agent(), self._scenario), self._scenario, config.validation_episodes)
             row["validation"] = vars(score)
             if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
                 weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}
@@ -177,7 +167,7 @@ class _Run:
         write_json(self._folder.history, self._at.history)
         write_json(self._folder.run, self._content())
 
-    def _finish(self) -> Result:
+    def _finish(self) -> dict[str, Any]:
         """Writes the agent and the result of the run."""
         policy, config, best = self._trainer.policy, self._config, self._at.best
         final = weights_hash(policy)
@@ -194,7 +184,7 @@ class _Run:
         # A run that was killed after its last checkpoint and before its history lacks the last row.
         write_json(self._folder.history, self._at.history)
         write_json(self._folder.run, content)
-        return Result(self._folder.path, final, Score(**score))
+        return content
 
     def _content(self) -> dict[str, Any]:
         """The content of `run.json`."""

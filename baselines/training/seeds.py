@@ -48,23 +48,6 @@ class RunOptions:
 
 
 @dataclasses.dataclass(frozen=True)
-class SeedResult:
-    """The result of a seed.
-
-    Args:
-        seed: The seed.
-        score: The score of the kept agent; None if the run failed.
-        weights_sha256: The SHA-256 of the final weights; empty if the run failed.
-        error: Why the run failed; empty otherwise.
-    """
-
-    seed: int
-    score: Score | None = None
-    weights_sha256: str = ""
-    error: str = ""
-
-
-@dataclasses.dataclass(frozen=True)
 class Seed:
     """The job of a worker: one seed.
 
@@ -87,8 +70,8 @@ class Seed:
 
 def train_seeds(
     config: APG, options: RunOptions, seeds: Sequence[int], *, workers: Workers = ALONE, command: str = ""
-) -> list[SeedResult]:
-    """Trains one agent a seed; the results are in the order of the seeds.
+) -> dict[int, str]:
+    """Trains one agent a seed; returns why each seed failed, in the order of the seeds, and "" where it did not.
 
     One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others. On
     a cluster, all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
@@ -99,20 +82,23 @@ def train_seeds(
         ResultsError: On a cluster: a run exists, and is neither resumed nor overwritten.
     """
     remote = workers.cluster is not None
-    lines = [line if options.progress and not remote else None for line in range(len(seeds))]
-    if len(seeds) == 1 and not remote:
-        return [train_seed(Seed(config, options, command, seeds[0], lines[0]))]
     if remote:
         options = _shared(options, seeds)
+    lines = [line if options.progress and not remote else None for line in range(len(seeds))]
     jobs = [Seed(config, options, command, seed, line, remote) for seed, line in zip(seeds, lines, strict=True)]
-    results = dict[int, SeedResult]()
+    if len(jobs) == 1 and not remote:
+        return {jobs[0].seed: train_seed(jobs[0])}
+    errors = dict.fromkeys(seeds, "")
     tries = TRIES if remote else 1  # on one machine a second attempt would fail again
-    for job, future in finished(attempt, jobs, workers, tries=tries):
+    for job, future in finished(train_seed, jobs, workers, tries=tries):
         try:
-            results[job.seed] = future.result()
+            errors[job.seed] = future.result()
         except WorkerError as e:
-            results[job.seed] = SeedResult(job.seed, error=f"{e} Continue with --resume.")
-    return [results[seed] for seed in seeds]
+            errors[job.seed] = f"{e} Continue with --resume."
+        except Exception as e:  # an error of the program does not end the other seeds
+            traceback.print_exc()
+            errors[job.seed] = f"{type(e).__name__}: {' '.join(str(e).split())}"
+    return errors
 
 
 def _shared(options: RunOptions, seeds: Sequence[int]) -> RunOptions:
@@ -125,15 +111,17 @@ def _shared(options: RunOptions, seeds: Sequence[int]) -> RunOptions:
     return dataclasses.replace(options, out=options.out.absolute(), resume=True, overwrite=False)
 
 
-def train_seed(job: Seed) -> SeedResult:
-    """Trains the agent of a seed, in the process of a worker."""
+def train_seed(job: Seed) -> str:
+    """Trains the agent of a seed, in the process of a worker; returns why it failed, or ""."""
     # PyTorch takes seconds to load, and the parent process does not need it.
     from baselines.training.run import train
 
-    options, seed = job.options, job.seed
+    options, folder = job.options, job.options.folder(job.seed)
+    if job.remote and not folder.exists():
+        return f"{platform.node()} does not see {options.out}: expected a folder that all nodes of the cluster share"
     bar = tqdm(
         total=job.config.segments,
-        desc=f"seed {seed}",
+        desc=f"seed {job.seed}",
         disable=job.line is None,
         position=job.line,
         file=sys.stderr,
@@ -144,15 +132,15 @@ def train_seed(job: Seed) -> SeedResult:
 
     def show(done: int, score: Score | None) -> None:
         if score is not None:
-            bar.set_description(f"seed {seed}: cost {score.cost:.4g}", refresh=False)
+            bar.set_description(f"seed {job.seed}: cost {score.cost:.4g}", refresh=False)
         bar.update(done - bar.n)
 
     try:
         with bar:
-            result = train(
+            train(
                 job.config,
-                seed,
-                options.folder(seed),
+                job.seed,
+                folder,
                 resume=options.resume,
                 overwrite=options.overwrite,
                 checkpoint_every=options.checkpoint_every,
@@ -160,22 +148,8 @@ def train_seed(job: Seed) -> SeedResult:
                 on_segment=show,
             )
     except IkgymError as e:
-        return SeedResult(seed, error=" ".join(str(e).split()))
+        return " ".join(str(e).split())
     except MemoryError as e:
         advice = "Choose fewer arms (--n-envs) or a smaller network (--hidden)."
-        return SeedResult(seed, error=f"Out of memory: {' '.join(str(e).split())}. {advice}")
-    return SeedResult(seed, result.score, result.weights_sha256)
-
-
-def attempt(job: Seed) -> SeedResult:
-    """The same in a worker, with any error as a result, so that other seeds continue."""
-    if job.remote and not job.options.folder(job.seed).exists():
-        unseen = (
-            f"{platform.node()} does not see {job.options.out}: expected a folder that all nodes of the cluster share"
-        )
-        return SeedResult(job.seed, error=unseen)
-    try:
-        return train_seed(job)
-    except Exception as e:
-        traceback.print_exc()
-        return SeedResult(job.seed, error=f"{type(e).__name__}: {' '.join(str(e).split())}")
+        return f"Out of memory: {' '.join(str(e).split())}. {advice}"
+    return ""

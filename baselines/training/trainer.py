@@ -12,7 +12,6 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import AgentFile, agent_of, load_agent
 from baselines.training.config import APG, Activation, TrainingError
 from baselines.training.exporting import ACTIVATIONS, runtime
@@ -192,7 +191,7 @@ def _load_weights(policy: nn.Sequential, config: APG) -> None:
         TrainingError: The agent has another structure.
     """
     assert config.init is not None
-    agent, own = load_agent(config.init, (Bilinear,)), runtime(list(policy), "linear")
+    agent, own = load_agent(config.init), runtime(list(policy), "linear")
     if (agent.processing, agent.network.to_json()) != (config.processing, own.to_json()):
         raise TrainingError(
             f"{config.init}: expected an agent with {config.processing} and a network {own.to_json()}, got "

@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from baselines.agents.files import load_agent
-from baselines.agents.track import Track
 from baselines.evaluation.results import read_rows
 from baselines.solvers.rivals.model_files import urdf
 from baselines.training.methods import configure
@@ -47,7 +46,7 @@ READERS = {
     "ranges.toml": ranges.read,
     "points.csv": from_csv,
     "arm.urdf": arms.from_urdf,
-    "it.safetensors": lambda file: load_agent(file, (Track,)),
+    "it.safetensors": load_agent,
     "results.json": read_rows,
 }
 

@@ -1,75 +1,100 @@
-"""Kernels of the bilinear agent: its features with their gradient, and its law."""
+"""Kernels of the law of the bilinear agent, and of the damped inverse that its network tunes.
+
+With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
+damping, which the network gives beside G and h,
+
+    G' = G + U Jᵀ (J U Jᵀ + λ I)⁻¹
+
+replaces G (weighted damped least squares, as in Nakamura and Hanafusa 1986), and its projection into the null space,
+h' = (I - G' J) h, replaces h. An output holds G and h, then ln λ relative to the initial λ, then ln U; both logarithms
+are clipped at ±:data:`LARGEST`.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from baselines.agents.bilinear.damped_kernels import held_rows
-from baselines.agents.bilinear.features import context_rows, mean_twists
-from baselines.agents.bilinear.rates import metric_rows, rate_rows
+from baselines.agents.bilinear.features import feature_rows, mean_twists, metric_rows, seen_jacobian
 from baselines.agents.network import forward_rows
+from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.rl.twists import is_turned, turn, turn_gradient, twist, twist_size
+from ikgym.rl.twists import is_turned, turn, twist, twist_size
+
+#: Bound of the logarithms.
+LARGEST = 6.0
 
 
 @kernel
-def seen_rows(kind, chain, dt, offsets, rates, q, nominal, remaining, out, speed):
-    """The features of the network, row by row.
+def held_rows(kind, chain, damping, q, output, out):
+    """(G', h'), row by row.
 
     Args:
         kind: Of task coordinates.
         chain: The arm.
-        dt: Δt in [s].
-        offsets: Shape (p,).
-        rates: Whether joint rates are among them.
+        damping: The initial λ, above 0.
         q: Shape (B, n).
-        nominal: At the offsets. Shape (B, p, m).
-        remaining: Shape (B, 1).
-        out: Receives the features. Shape (B, f).
-        speed: Receives the speeds. Shape (B,).
+        output: Of the network. Shape (B, n (w + 1) + 1 + n).
+        out: Receives (G', h'), float64. Shape (B, n (w + 1)).
     """
-    context_rows(kind, chain.prismatic, chain.axes[0], dt, offsets, q, nominal, remaining, out, speed)
-    if rates:
-        rate_rows(kind, chain, dt, offsets, q, nominal, speed, out)
+    n, w = q.shape[1], twist_size(kind)
+    jacobian, metric, products, moved = np.empty((6, n)), np.empty(n), np.empty((w, n)), np.empty(w)
+    for row in range(q.shape[0]):
+        given, held = output[row], out[row]
+        invert(kind, chain, damping, q[row], given[n * (w + 1) :], jacobian, metric, products)
+        for a in range(w):  # J h, the motion of the tool that h alone causes
+            moved[a] = 0.0
+            for j in range(n):
+                moved[a] += jacobian[a, j] * given[j * (w + 1) + w]
+        for j in range(n):
+            own = j * (w + 1)
+            held[own + w] = given[own + w]
+            for a in range(w):
+                held[own + a] = given[own + a] + metric[j] * products[a, j]
+                held[own + w] -= held[own + a] * moved[a]
 
 
-@kernel
-def feature_gradient_rows(kind, prismatic, axis, twists, features, gradient, out):
-    """From the gradient with respect to context features to that with respect to joint coordinates, row by row.
-
-    The speed of the reference ahead does not depend on where the arm is.
+@inner
+def invert(kind, chain, damping, q, given, jacobian, metric, products):
+    """The damped inverse of one arm; an output that is NaN leads to NaN.
 
     Args:
         kind: Of task coordinates.
-        prismatic: Shape (n,).
-        axis: Shape (3,).
-        twists: How many are seen ahead.
-        features: As :func:`baselines.agents.bilinear.features.context_rows` gives them. Shape (B, f).
-        gradient: With respect to the features. Shape (B, f).
-        out: Receives the gradient. Shape (B, n).
+        chain: The arm.
+        damping: The initial λ.
+        q: Shape (n,).
+        given: ln λ relative to the initial one, and ln U. Shape (1 + n,).
+        jacobian: Receives J, see :func:`baselines.agents.bilinear.features.seen_jacobian`. Shape (6, n).
+        metric: Receives the diagonal of U. Shape (n,).
+        products: Receives (J U Jᵀ + λ I)⁻¹ J. Shape (w, n).
     """
-    turned, n = is_turned(kind, prismatic), prismatic.shape[0]
-    for row in range(features.shape[0]):
-        x, g, at = features[row], gradient[row], 0
-        out[row, 0] = 0.0
-        for j in range(1 if turned else 0, n):
-            if prismatic[j]:
-                out[row, j] = g[at]
-                at += 1
-            else:
-                out[row, j] = g[at] * x[at + 1] - g[at + 1] * x[at]
-                at += 2
-        if turned:
-            end = at + twists * twist_size(kind)
-            out[row, 0] = turn_gradient(axis, x[at:end], g[at:end])
+    w, n = products.shape
+    scaled, factor, inverse = np.empty((w, n)), np.empty((w, w)), np.empty((w, w))
+    seen_jacobian(kind, chain, q, np.empty(n), np.empty((3, 3)), np.empty(3), jacobian)
+    lambda_ = damping * from_logarithm(given[0])
+    for j in range(n):
+        metric[j] = from_logarithm(given[1 + j])
+        root = math.sqrt(metric[j])
+        for a in range(w):
+            scaled[a, j] = jacobian[a, j] * root
+    damped_gram(scaled, lambda_, factor)
+    if ldl(factor):
+        ldl_scaled_inverse(factor, 1.0, inverse)
+    else:
+        inverse[:] = np.nan
+    for a in range(w):
+        for j in range(n):
+            total = 0.0
+            for b in range(w):
+                total += inverse[a, b] * jacobian[b, j]
+            products[a, j] = total
 
 
 @inlined
-def seen_twist(kind, turned, axis, angle, pose, nominal, error, due):
-    """The motion from a pose to the next one of the reference, seen from the frame of joint 1 where `turned`."""
-    twist(kind, nominal, pose, error, due)
-    if turned:
-        turn(axis, -angle, due)
+def from_logarithm(number):
+    """The number whose logarithm is an output."""
+    return math.exp(min(max(number, -LARGEST), LARGEST))
 
 
 @inner
@@ -89,14 +114,22 @@ def action_rows(scene, velocity_limit, q, pose, nominal, output, out):
     turned, n, w, axis = is_turned(kind, chain.prismatic), q.shape[1], twist_size(kind), chain.axes[0]
     error, due, ahead = np.empty(6), np.empty(w), np.empty((offsets.shape[0] - 1, w))
     for row in range(q.shape[0]):
-        speed, lead = mean_twists(kind, dt, offsets, nominal[row], error, ahead), offsets[0] * dt
-        seen_twist(kind, turned, axis, q[row, 0], pose[row], nominal[row, 0], error, due)
+        speed = mean_twists(kind, dt, offsets, nominal[row], error, ahead)
+        twist(kind, nominal[row, 0], pose[row], error, due)
+        if turned:  # seen from the frame of joint 1
+            turn(axis, -q[row, 0], due)
         for j in range(n):
-            own = output[row, j * (w + 1) : (j + 1) * (w + 1)]
-            qdot = own[w] * speed
-            for a in range(w):
-                qdot += own[a] * due[a] / lead
-            out[row, j] = qdot / velocity_limit[j]
+            out[row, j] = commanded(output[row], j, due, speed, dt) / velocity_limit[j]
+
+
+@inlined
+def commanded(output, j, due, speed, dt):
+    """The velocity command of joint ``j``: row j of G times the remaining twist, plus h_j s."""
+    w = due.shape[0]
+    velocity = output[j * (w + 1) + w] * speed
+    for a in range(w):
+        velocity += output[j * (w + 1) + a] * due[a] / dt
+    return velocity
 
 
 @kernel
@@ -105,7 +138,7 @@ def law_rows(scene, damping, velocity_limit, network, batch, interval, held, lef
 
     Args:
         scene: Kind of task coordinates, the arm, Δt in [s], and the offsets.
-        damping: Of :func:`baselines.agents.bilinear.damped_kernels.held_rows`, which is left out where it is 0.
+        damping: See :func:`held_rows`.
         velocity_limit: Shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference at the offsets and steps left. Shape (B, …).
@@ -123,12 +156,9 @@ def law_rows(scene, damping, velocity_limit, network, batch, interval, held, lef
         if left[row] == 0:
             left[row] = interval
             own = slice(row, row + 1)
-            seen_rows(kind, chain, dt, offsets, damping > 0.0, q[own], nominal[own], remaining[own], features, speed)
+            feature_rows(kind, chain, dt, offsets, q[own], nominal[own], remaining[own], features, speed)
             forward_rows(weights, biases, sizes, activation, squash, features, output)
-            if damping > 0.0:
-                metric_rows(kind, chain.prismatic, offsets.shape[0] - 1, features, output)
-                held_rows(kind, chain, damping, q[own], output, held[own])
-            else:
-                held[row] = output[0]
+            metric_rows(kind, chain.prismatic, offsets.shape[0] - 1, features, output)
+            held_rows(kind, chain, damping, q[own], output, held[own])
         left[row] -= 1
     action_rows(scene, velocity_limit, q, pose, nominal, held, out)

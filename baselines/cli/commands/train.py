@@ -10,7 +10,7 @@ import itertools
 import pathlib
 import shlex
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
@@ -21,7 +21,7 @@ from baselines.cli.parsing import parse as parse_options
 from baselines.training import methods
 from baselines.training.config import APG, Rewards, TrainingError
 from baselines.training.folder import read_run
-from baselines.training.seeds import RunOptions, SeedResult, train_seeds
+from baselines.training.seeds import RunOptions, train_seeds
 from baselines.workers import Workers
 from ikgym import rl, scenarios
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
@@ -126,7 +126,7 @@ Files of a run of apg, which may be killed at any time:
   agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
-used. Where there is a reference, the cost ratio is the geometric mean of the costs over those of rhc_foresight."""
+used. The cost ratio is stated where the best known costs of all validation episodes are known."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -225,14 +225,14 @@ def _train_by_rewards(command: ByRewards[Any]) -> int:
 def _train(command: Command, text: str) -> int:
     options = command.options
     workers = Workers(options.workers, options.cluster)
-    results = train_seeds(command.config, options, _checked_seeds(options.seeds), workers=workers, command=text)
-    print(table(results))
-    for result in results:
-        if result.error:
-            print(f"error: seed {result.seed}: {result.error}", file=sys.stderr)
-    if not all(result.error for result in results):
+    errors = train_seeds(command.config, options, _checked_seeds(options.seeds), workers=workers, command=text)
+    print(table(errors, options))
+    for seed, error in errors.items():
+        if error:
+            print(f"error: seed {seed}: {error}", file=sys.stderr)
+    if not all(errors.values()):
         print(f"\nwritten to {options.out}")
-    return 2 if any(result.error for result in results) else 0
+    return 2 if any(errors.values()) else 0
 
 
 def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
@@ -250,14 +250,15 @@ def _repeat(command: Repeat) -> int:
         raise TrainingError(f"{command.run} belongs to a run that has not ended: finish it with --resume.")
     config = APG.from_json(about["config"])
     seed, text = whole_number("seed", about["seed"], at_least=0), [*_program().split(), "repeat", str(command.run)]
-    (result,) = train_seeds(config, command, [seed], command=shlex.join(text))
-    if result.error:
-        raise TrainingError(result.error)
-    if result.weights_sha256 == wanted:
+    (error,) = train_seeds(config, command, [seed], command=shlex.join(text)).values()
+    if error:
+        raise TrainingError(error)
+    again = read_run(command.folder(seed) / "run.json")
+    if again["weights_sha256"] == wanted:
         print(f"The same final weights, bit for bit: {wanted}")
         return 0
-    print(f"Other final weights: expected {wanted}, got {result.weights_sha256}.")
-    for line in _reasons(about, read_run(command.folder(seed) / "run.json")):
+    print(f"Other final weights: expected {wanted}, got {again['weights_sha256']}.")
+    for line in _reasons(about, again):
         print(line)
     return 1
 
@@ -269,14 +270,14 @@ def _reasons(there: dict[str, Any], here: dict[str, Any]) -> Iterable[str]:
             yield f"  {part}: {there.get(part)} there, {here.get(part)} here"
 
 
-def table(results: Sequence[SeedResult]) -> str:
-    """A table of seeds and their scores."""
+def table(errors: Mapping[int, str], options: RunOptions) -> str:
+    """A table of seeds and their scores, from the files of their runs."""
     lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
-    for result in results:
-        if result.score is None:
-            lines.append(f"{result.seed:>4}  failed")
+    for seed, error in errors.items():
+        if error:
+            lines.append(f"{seed:>4}  failed")
             continue
-        score = result.score
-        cost_ratio = "–" if score.cost_ratio is None else f"{score.cost_ratio:.4f}"
-        lines.append(f"{result.seed:>4}  {cost_ratio:>8}  {score.cost:>10.5g}  {score.worst:>8.4g}  {score.lost:>6.1%}")
+        score = read_run(options.folder(seed) / "run.json")["kept"]["validation"]
+        ratio = "–" if score["cost_ratio"] is None else f"{score['cost_ratio']:.4f}"
+        lines.append(f"{seed:>4}  {ratio:>8}  {score['cost']:>10.5g}  {score['worst']:>8.4g}  {score['lost']:>6.1%}")
     return "\n".join(lines)

@@ -6,38 +6,32 @@ import itertools
 
 import numpy as np
 
-from baselines.papers.comparisons import SAME, YANK, extent, rms, sign_changes
+from baselines.papers.comparisons import SAME, YANK, extent, largest_error, rms, sign_changes
 from baselines.papers.faitli.episodes import (
     REGULAR,
     SHOULDER,
     STRETCHED,
     TRAJECTORIES,
     jacobians,
-    nominal_joints,
     real_zeros,
     short,
     singular_places,
     singular_values,
     solved,
-    times,
     yank,
 )
 from baselines.papers.paper import Finding, scaled
-from baselines.papers.runs import Runs
+from baselines.papers.runs import Runs, nominal_joints, times
 from baselines.papers.varga.episodes import FAST, SLOW, nominal_angles
 from baselines.recording import Episode
 from baselines.registry import make
 from ikgym.validation import FloatArray
 
 
-def _largest_error(episode: Episode) -> float:
-    return float(episode.position_error.max())
-
-
 def accurate_tracking(runs: Runs) -> Finding:
     """Largest error as a share of the path's extent."""
     shares = {
-        short(name): _largest_error(solved(runs, name)) / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES
+        short(name): largest_error(solved(runs, name)) / extent(runs.scenario(name).nominal()) for name in TRAJECTORIES
     }
     return Finding(max(shares.values()) < SAME, scaled(shares, "%"))
 
@@ -121,7 +115,7 @@ def a_decides_convergence(runs: Runs) -> Finding:
     """Largest error with values of A within and beyond the bound."""
     scenario = runs.scenario(REGULAR)
     bound = 4.0 / float(singular_values(jacobians(scenario, nominal_joints(scenario))).max() ** 2)
-    errors = {a: _largest_error(solved(runs, REGULAR, a=a)) for a in (0.1, -0.1, -1.0, -2.0, -3.0)}
+    errors = {a: largest_error(solved(runs, REGULAR, a=a)) for a in (0.1, -0.1, -1.0, -2.0, -3.0)}
     good = {a: e for a, e in errors.items() if -bound < a < 0.0}
     bad = {a: e for a, e in errors.items() if a not in good}
     figures = scaled({"": list(errors.values())}, "mm")
@@ -133,7 +127,7 @@ def transpose_helps_convergence(runs: Runs) -> Finding:
     figures = {}
     for name in TRAJECTORIES:
         without = [solved(runs, name, transformation="none", a=a) for a in (-1.0, -0.1, 0.1, 1.0)]
-        figures[short(name)] = _largest_error(solved(runs, name)), min(map(_largest_error, without))
+        figures[short(name)] = largest_error(solved(runs, name)), min(map(largest_error, without))
     return Finding(all(a < b for a, b in figures.values()), scaled(figures, "mm"))
 
 
@@ -146,7 +140,7 @@ def not_square(runs: Runs) -> Finding:
     figures: dict[str, list[float]] = {}
     for path, iterations in itertools.product((SLOW, FAST), (10, 50)):
         episode, where = solved(runs, path, length=1.0, iterations=iterations), f"{path}, {iterations}"
-        position, angle = _largest_error(episode), float(episode.orientation_error.max())
+        position, angle = largest_error(episode), float(episode.orientation_error.max())
         of_extent = position / extent(runs.scenario(path).nominal()[:, 3:])
         of_turn = angle / float(nominal_angles(runs, path).max())
         holds |= {f"{where}, position": of_extent < SAME, f"{where}, orientation": of_turn < SAME}

@@ -9,7 +9,6 @@ import numpy as np
 from baselines.papers.comparisons import sign_changes
 from baselines.papers.runs import Runs
 from baselines.recording import Episode
-from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
@@ -81,20 +80,3 @@ def real_zeros(jacobian: FloatArray) -> list[int]:
     """Indices of the steps after which the real part of an eigenvalue of J changes its sign."""
     real = np.sort(np.linalg.eigvals(jacobian).real, axis=1)
     return sorted({step for column in real.T for step in sign_changes(column)})
-
-
-def times(scenario: Scenario) -> FloatArray:
-    """Times at the end of each step, in [s]. Shape (steps,)."""
-    return scenario.times(scenario.steps + 1)[1:]
-
-
-def nominal_joints(scenario: Scenario) -> FloatArray:
-    """The joint coordinates that generate the nominal path, in [rad]. Shape (steps, n).
-
-    Raises:
-        InvalidInputError: The scenario has no such path.
-    """
-    path = scenario.nominal_joint_path()
-    if path is None:
-        raise InvalidInputError(f"scenario {scenario.name!r} has no joint path to compare with.")
-    return path[1:]

@@ -14,13 +14,11 @@ from baselines.papers.faitli.episodes import (
     SHOULDER,
     STRETCHED,
     jacobians,
-    nominal_joints,
     singular_values,
     solved,
-    times,
 )
 from baselines.papers.paper import PaperFigure
-from baselines.papers.runs import Runs
+from baselines.papers.runs import Runs, nominal_joints, times
 from ikgym.validation import FloatArray
 
 LABELS = ("x", "y", "z")

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.papers.comparisons import CONSIDERABLY, above, larger, rms
+from baselines.papers.comparisons import CONSIDERABLY, above, larger, largest_error, peak_speed, rms
 from baselines.papers.paper import Figures, Finding, scaled
-from baselines.papers.runs import Runs
+from baselines.papers.runs import Runs, nominal_joints
 from baselines.papers.varga.episodes import (
     ALPHAS,
     FAST,
@@ -24,7 +24,6 @@ from baselines.papers.varga.episodes import (
     fluctuation,
     largest_jump,
     nominal_angles,
-    nominal_path,
     slow,
     smooth,
     time_of_step,
@@ -109,19 +108,15 @@ def multipliers_cost_more(runs: Runs) -> Finding:
 def acceptable_precision(runs: Runs) -> Finding:
     """Largest errors on the fast path."""
     episode = fast(runs)
-    largest = float(episode.position_error.max())
+    largest = largest_error(episode)
     extent = float(np.ptp(runs.scenario(FAST).nominal()[:, 3:], axis=0).max())
     figures = {"[mm]": 1e3 * largest, "of the extent [%]": 100.0 * largest / extent}
     return Finding(None, {**figures, "[rad]": float(episode.orientation_error.max())})
 
 
-def _largest_error(episode: Episode) -> float:
-    return float(episode.position_error.max())
-
-
 def slow_is_finer(runs: Runs) -> Finding:
     """Largest position errors on the fast and the slow path."""
-    a, b = _largest_error(fast(runs)), _largest_error(slow(runs))
+    a, b = largest_error(fast(runs)), largest_error(slow(runs))
     return Finding(larger(a, b), scaled({"fast": a, "slow": b}, "mm"))
 
 
@@ -156,13 +151,13 @@ def slow_fluctuates(runs: Runs) -> Finding:
 
 def other_joint_paths(runs: Runs) -> Finding:
     """Largest distance of a joint coordinate from its nominal one."""
-    apart = float(np.abs(fast(runs).q - nominal_path(runs, FAST)[1:]).max())
+    apart = float(np.abs(fast(runs).q - nominal_joints(runs.scenario(FAST))).max())
     return Finding(apart > 0.05, {"[rad or m]": apart})
 
 
 def velocities_bounded(runs: Runs) -> Finding:
     """Peak joint velocities of the method and of the pseudoinverse."""
-    method, other = (float(np.abs(e.qdot).max()) for e in (fast(runs), runs.play(FAST, "moore_penrose")))
+    method, other = map(peak_speed, (fast(runs), runs.play(FAST, "moore_penrose")))
     return Finding(larger(other, method), {"method [rad/s]": method, "pseudoinverse [rad/s]": other})
 
 
@@ -181,7 +176,7 @@ def smoothing_calms(runs: Runs) -> Finding:
 
 def smoothing_errs(runs: Runs) -> Finding:
     """Largest position errors before and after smoothing."""
-    a, b = _largest_error(fast(runs)), _largest_error(smooth(runs))
+    a, b = largest_error(fast(runs)), largest_error(smooth(runs))
     return Finding(larger(b, a, CONSIDERABLY), scaled({"before": a, "after": b}, "mm"))
 
 

@@ -64,11 +64,6 @@ def smooth(runs: Runs) -> Episode:
     return runs.play(FAST, "smoothed", policy=METHOD)
 
 
-def nominal_path(runs: Runs, name: str) -> FloatArray:
-    """Eq. 11 or 12: the nominal joint coordinates, in [rad] or [m]. Shape (steps + 1, 7)."""
-    return np.asarray(runs.scenario(name).nominal_joint_path(), dtype=np.float64)
-
-
 def diverged(episode: Episode) -> float:
     """The share of control steps that diverged."""
     return float((episode.status == Status.DIVERGED).mean())
@@ -101,7 +96,7 @@ def variation(qdot: FloatArray) -> float:
 
 def nominal_angles(runs: Runs, name: str) -> FloatArray:
     """Angles of rotation from the home orientation along the nominal path, in [rad]. Shape (k,)."""
-    rotations, _ = runs.scenario(name).arm.forward(nominal_path(runs, name))
+    rotations, _ = runs.scenario(name).arm.forward(np.asarray(runs.scenario(name).nominal_joint_path()))
     skew = 0.5 * (rotations - np.swapaxes(rotations, 1, 2))[:, (0, 0, 1), (1, 2, 2)]
     sine, cosine = np.linalg.norm(skew, axis=1), 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
     return np.asarray(np.arctan2(sine, cosine))

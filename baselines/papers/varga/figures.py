@@ -10,8 +10,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from baselines.papers.drawing import Curve, Panel, compared, picture
 from baselines.papers.paper import PaperFigure
-from baselines.papers.runs import Runs
-from baselines.papers.varga.episodes import FAST, METHOD, SLOW, fast, nominal_path, slow, smooth
+from baselines.papers.runs import Runs, nominal_joints, times
+from baselines.papers.varga.episodes import FAST, METHOD, SLOW, fast, slow, smooth
 from baselines.recording import Episode
 from ikgym.validation import FloatArray
 
@@ -19,14 +19,9 @@ WINDOW = 150  # steps of a close-up
 FLUCTUATES = "zoomed in to a domain where considerable fluctuations occur"
 
 
-def _times(runs: Runs, name: str) -> FloatArray:
-    scenario = runs.scenario(name)
-    return scenario.times(scenario.steps + 1)[1:]
-
-
 def _coordinates(title: str, runs: Runs, name: str, episode: Episode, coordinates: dict[str, int], unit: str) -> Figure:
     """Some task coordinates, nominal and actual, above their errors."""
-    time, nominal = _times(runs, name), runs.scenario(name).nominal()[1:]
+    time, nominal = times(runs.scenario(name)), runs.scenario(name).nominal()[1:]
     tracks, errors = [], []
     for label, i in coordinates.items():
         tracks += [
@@ -49,7 +44,7 @@ def _orientation(title: str, runs: Runs, name: str, episode: Episode) -> Figure:
 def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Figure:
     prismatic = runs.scenario(name).arm.prismatic
     labels = [f"$q_{i + 1}$ [{'m' if p else 'rad'}]" for i, p in enumerate(prismatic)]
-    panels = compared(labels, _times(runs, name), episode.q, nominal_path(runs, name)[1:])
+    panels = compared(labels, times(runs.scenario(name)), episode.q, nominal_joints(runs.scenario(name)))
     return picture(title, panels, columns=2, height=1.6)
 
 
@@ -65,7 +60,7 @@ def _velocities(
     title: str, runs: Runs, name: str, episode: Episode, part: slice | None = None, caption: str = FLUCTUATES
 ) -> Figure:
     """Joint velocities of a whole episode and of a part, the busiest if left out, with the paper's caption."""
-    time, part = _times(runs, name), part or busiest(episode.qdot)
+    time, part = times(runs.scenario(name)), part or busiest(episode.qdot)
     names = [f"$\\dot q_{i + 1}$" + (" [m/s]" if p else "") for i, p in enumerate(runs.scenario(name).arm.prismatic)]
     curves = [Curve(n, time, episode.qdot[:, i]) for i, n in enumerate(names)]
     close = [Curve(c.name, time[part], c.y[part]) for c in curves]
@@ -79,7 +74,7 @@ def _smoothed_velocities(title: str, runs: Runs, name: str, episode: Episode) ->
 
 def _effort(runs: Runs) -> Figure:
     """With α restarted, as in the other figures, and kept, both with the printed bounds of α."""
-    time, kept = _times(runs, FAST), runs.play(FAST, METHOD, alpha_start="kept")
+    time, kept = times(runs.scenario(FAST)), runs.play(FAST, METHOD, alpha_start="kept")
     episodes = {"α restarted in each control step": fast(runs), "α kept": kept}
     values = {
         "time [ms]": {name: 1e-6 * episode.time_ns.astype(np.float64) for name, episode in episodes.items()},

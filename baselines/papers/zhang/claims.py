@@ -1,6 +1,6 @@
 """Zhang 2020: the tests of the claims in ``claims.toml``, each function named after its claim.
 
-Those of sections IV and V are in modules of their own.
+Those of sections IV and V are in :mod:`baselines.papers.zhang.predictive`.
 """
 
 from __future__ import annotations
@@ -11,22 +11,29 @@ from typing import Any
 
 import numpy as np
 
-from baselines.papers.comparisons import SAME, above, falls, larger, rms
+from baselines.papers.comparisons import SAME, above, falls, larger, largest_error, peak_speed, rms
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
     HELIX,
     LINE,
+    SHARES,
     SINGULAR,
+    TARGETS,
+    at_rest,
     constant,
+    drawn,
+    iterates,
     jacobians_used,
+    met,
     of_link,
     predictive,
     ramp_errors,
+    rank_correlation,
     settled_error,
     settled_from,
+    sugihara,
 )
-from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn, iterates, met, rank_correlation, sugihara
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.status import Status
 from ikgym import Plant
@@ -97,7 +104,7 @@ def robustness(runs: Runs) -> Finding:
         return float((at_rest(runs, share, 0.1, links=links)[0][-1] >= SAME).mean())
 
     def peak(scenario: str, share: float) -> float:
-        return float(np.abs(constant(runs, scenario, of_link(runs, scenario, share)).qdot).max())
+        return peak_speed(constant(runs, scenario, of_link(runs, scenario, share)))
 
     values = {f"lost, links of {100 * links:.0f} %": [lost(s, links) for s in SHARES] for links in (0.45, 0.3)}
     places = {"start": HELIX, "shoulder": "faitli3-shoulder", "elbow": "faitli3-stretched"}
@@ -138,9 +145,9 @@ def robustness_on_plants(runs: Runs) -> Finding:
         dampings = [of_link(runs, LINE, share) for share in (*SHARES, 10.0)]
         episodes = [runs.play(scenario, "mfac", one_step=True, rule="constant", damping=d) for d in dampings]
         if plant.command_delay:
-            errors[name] = [float(episode.position_error.max()) for episode in episodes]
+            errors[name] = [largest_error(episode) for episode in episodes]
         else:
-            peaks[name] = [float(np.abs(episode.qdot).max()) for episode in episodes]
+            peaks[name] = [peak_speed(episode) for episode in episodes]
     return _falls_with_lambda(errors, "mm", peaks)
 
 

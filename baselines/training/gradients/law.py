@@ -9,15 +9,16 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from baselines.agents.bilinear.damped_kernels import held_gradient_rows, held_rows
-from baselines.agents.bilinear.kernels import feature_gradient_rows, seen_rows
+from baselines.agents.bilinear.features import feature_rows, metric_rows
+from baselines.agents.bilinear.kernels import LARGEST
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bilinear.rates import AT_REST, EXPONENT, LITTLE
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
+from baselines.training.gradients.jacobian import jacobian_gradient_rows, jacobian_rows
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym.exceptions import InvalidInputError
 from ikgym.parallel import in_chunks
+from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -46,13 +47,16 @@ class Law:
         problem = Problem.of(scenario)
         self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
         self.task = Task.of(scenario)
-        self.chain, self._offsets = scenario.model.chain, np.array(processing.offsets)
-        self._damping, self._twists = processing.damping, len(processing.offsets) - 1
+        self.chain, self._offsets, self._damping = (
+            scenario.model.chain,
+            np.array(processing.offsets),
+            processing.damping,
+        )
 
     def features(self, q: Tensor, nominal: FloatArray, remaining: FloatArray) -> tuple[Tensor, FloatArray]:
         """The features of :class:`Bilinear`.
 
-        With a damping they are constants for the gradient, which then goes through the arm and its law alone.
+        They are constants for the gradient, which goes through the arm and its law alone.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -62,29 +66,19 @@ class Law:
         Returns:
             Features of shape (N, f), float64, and speeds of shape (N,).
         """
-        speed = np.empty(len(nominal))
-        if self._damping is not None:
-            seen = np.empty((len(nominal), self.inputs))
-            self.see(q.detach().numpy(), nominal, remaining, seen, speed)
-            return torch.from_numpy(seen), speed
-        out: Tensor = _Features.apply(q, self, nominal, remaining, speed)  # type: ignore[no-untyped-call]
-        return out, speed
-
-    def see(
-        self, q: FloatArray, nominal: FloatArray, remaining: FloatArray, out: FloatArray, speed: FloatArray
-    ) -> None:
-        """:meth:`features` without a gradient, into arrays of shapes (N, f) and (N,)."""
-        task, rates = self.task, self._damping is not None
+        task, joints = self.task, q.detach().numpy()
+        out, speed = np.empty((len(nominal), self.inputs)), np.empty(len(nominal))
 
         def work(start: int, stop: int) -> None:
             some = slice(start, stop)
-            arrays = q[some], nominal[some], remaining[some], out[some], speed[some]
-            seen_rows(task.kind, self.chain, task.dt, self._offsets, rates, *arrays)
+            arrays = joints[some], nominal[some], remaining[some], out[some], speed[some]
+            feature_rows(task.kind, self.chain, task.dt, self._offsets, *arrays)
 
         in_chunks(work, len(out), GRAIN)
+        return torch.from_numpy(out), speed
 
     def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
-        """(G, h) from the output of the network, with the damped inverse where there is one.
+        """(G, h) from the output of the network, as :func:`baselines.agents.bilinear.kernels.held_rows` gives them.
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (N, n), float64.
@@ -94,15 +88,18 @@ class Law:
         Returns:
             Shape (N, n (w + 1)), float64.
         """
-        if self._damping is None:
-            return output
-        n = q.shape[1]
-        first = self.inputs - n * self._twists
-        squares = features[:, first : first + n].square()
-        metric = -EXPONENT * (squares / (squares.mean(1, keepdim=True) + LITTLE) + AT_REST).log()
-        output = torch.cat([output[:, :-n], output[:, -n:] + metric], dim=1)
-        out: Tensor = _Held.apply(q, output, self)  # type: ignore[no-untyped-call]
-        return out
+        shift = np.zeros(output.shape)
+        metric_rows(self.task.kind, self.chain.prismatic, len(self._offsets) - 1, features.numpy(), shift)
+        n, w = q.shape[1], twist_size(self.task.kind)
+        given, lambda_, metric = torch.split(output + torch.from_numpy(shift), [n * (w + 1), 1, n], dim=1)
+        lambda_, metric = (self._damping * from_logarithm(lambda_))[:, :, None], from_logarithm(metric)
+        matrix, null = torch.split(given.view(-1, n, w + 1), [w, 1], dim=2)
+        jacobian: Tensor = _Jacobian.apply(q, self)  # type: ignore[no-untyped-call]
+        jacobian = jacobian[:, :w]
+        weighted = (jacobian * metric[:, None]).transpose(1, 2)
+        gram = jacobian @ weighted + lambda_ * torch.eye(w, dtype=q.dtype)
+        matrix = matrix + weighted @ torch.linalg.inv_ex(gram).inverse  # without an error where a number is NaN
+        return torch.cat([matrix, null - matrix @ (jacobian @ null)], dim=2).flatten(1)
 
     def move(self, q: Tensor, qdot: Tensor, output: Tensor, rows: Rows) -> tuple[Tensor, Tensor, Tensor, FloatArray]:
         """A segment of steps, see :func:`baselines.training.gradients.segment.segment`.
@@ -122,42 +119,26 @@ class Law:
         return *ends, path.distance
 
 
-class _Features(torch.autograd.Function):
+def from_logarithm(number: Tensor) -> Tensor:
+    """The numbers whose logarithms are an output, which is clipped."""
+    return number.clamp(-LARGEST, LARGEST).exp()
+
+
+class _Jacobian(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, q: Tensor, law: Law, nominal: FloatArray, remaining: FloatArray, speed: FloatArray) -> Tensor:
-        joints, out = q.detach().numpy(), np.empty((len(q), law.inputs))
-        law.see(joints, nominal, remaining, out, speed)
-        ctx.law, ctx.seen = law, (joints, out)
+    def forward(ctx: Any, q: Tensor, law: Law) -> Tensor:
+        out = np.empty((len(q), 6, q.shape[1]))
+        jacobian_rows(law.task.kind, law.chain, q.detach().numpy(), out)
+        ctx.law, ctx.jacobian = law, out
         return torch.from_numpy(out)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None, None, None, None]:
-        law, (joints, features) = ctx.law, ctx.seen
-        kind, chain = law.task.kind, law.chain
-        out = np.empty(joints.shape)
-        given = np.ascontiguousarray(gradient.numpy())
-        feature_gradient_rows(kind, chain.prismatic, chain.axes[0], law._twists, features, given, out)
-        return torch.from_numpy(out), None, None, None, None
-
-
-class _Held(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, q: Tensor, output: Tensor, law: Law) -> Tensor:
-        joints, given = q.detach().numpy(), np.ascontiguousarray(output.detach().numpy())
-        out = np.empty((len(joints), given.shape[1] - 1 - joints.shape[1]))
-        held_rows(law.task.kind, law.chain, law._damping, joints, given, out)
-        ctx.law, ctx.given = law, (joints, given)
-        return torch.from_numpy(out)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
-        law, (joints, given) = ctx.law, ctx.given
-        by_output, by_q = np.empty(given.shape), np.empty(joints.shape)
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        law, out = ctx.law, np.empty(ctx.jacobian.shape[::2])
         by = np.ascontiguousarray(gradient.numpy())
-        held_gradient_rows(law.task.kind, law.chain, law._damping, joints, given, by, by_output, by_q)
-        return torch.from_numpy(by_q), torch.from_numpy(by_output), None
+        jacobian_gradient_rows(law.task.kind, law.chain, ctx.jacobian, by, out)
+        return torch.from_numpy(out), None
 
 
 class _Segment(torch.autograd.Function):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.agents.bilinear.kernels import commanded
 from ikgym.arms.limits import limit_rows
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
@@ -134,16 +135,6 @@ def segment(task, rows, output, path, start, stop):
                 total[row] += cost_kernels.tracking(cost, error[:e]) + cost_kernels.velocity(cost, applied)
         if steps[row] > 0:
             distance[row] = missing(target, position)
-
-
-@inlined
-def commanded(output, j, due, speed, dt):
-    """The velocity command of joint ``j``: row j of G times the remaining twist, plus h_j s."""
-    w = due.shape[0]
-    velocity = output[j * (w + 1) + w] * speed
-    for a in range(w):
-        velocity += output[j * (w + 1) + a] * due[a] / dt
-    return velocity
 
 
 @inlined

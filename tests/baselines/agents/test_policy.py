@@ -26,8 +26,7 @@ WHOLE = ikgym.scenarios.get("varga7-pose-random").replace(steps=STEPS)
 PANDA = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
 KINDS = {
     "track": Track(AHEAD),
-    "bilinear": Bilinear(OFFSETS),
-    "bilinear, damped": Bilinear(OFFSETS, 1e-2, interval=2),
+    "bilinear": Bilinear(OFFSETS, interval=2),
 }
 contract = pytest.mark.parametrize("processing", KINDS.values(), ids=KINDS)
 

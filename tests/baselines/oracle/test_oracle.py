@@ -109,7 +109,6 @@ def test_kinds_of_starts():
     known = ["nominal joint path", "roll-out", "rhc, horizon 1001", "rhc, horizon 101"]
     assert kinds[: 4 + QUICK.starts] == known + [RANDOM] * QUICK.starts
     assert set(kinds[4 + QUICK.starts :]) <= {LOCAL_SEARCH}
-    assert [one.number for one in optimum.starts[4 : 4 + QUICK.starts]] == list(range(1, QUICK.starts + 1))
     assert all(one.cost is not None for one in optimum.starts[:4])
     assert set(optimum.found_by.split("; ")) <= {*known, RANDOM, LOCAL_SEARCH}
     json.dumps(dataclasses.asdict(optimum.record()))
@@ -118,12 +117,12 @@ def test_kinds_of_starts():
 
 def test_what_is_said_of_the_starts():
     starts = (
-        Start("nominal joint path", None, 100.0, 10.0 * (1.0 + 1e-7)),
-        Start(RANDOM, 1, 10.2, 10.0),
-        Start(RANDOM, 2, 10.06, 10.0 * (1.0 + 1e-5)),
-        Start(RANDOM, 3, 900.0),
-        Start(RANDOM, 4, math.inf),  # leaves the limits
-        Start(LOCAL_SEARCH, None, 10.05, 10.0),
+        Start("nominal joint path", 100.0, 10.0 * (1.0 + 1e-7)),
+        Start(RANDOM, 10.2, 10.0),
+        Start(RANDOM, 10.06, 10.0 * (1.0 + 1e-5)),
+        Start(RANDOM, 900.0),
+        Start(RANDOM, math.inf),  # leaves the limits
+        Start(LOCAL_SEARCH, 10.05, 10.0),
     )
     optimum = solve(short(steps=2), 0, QUICK).replace(cost=10.0, starts=starts)
     assert optimum.found_by == "nominal joint path; random start; local search"
@@ -149,7 +148,7 @@ def test_the_local_search_finds_what_a_start_does_not():
     problem = whole.on(whole.coarse(25))
     before = np.empty((2, len(problem.grid.at), 7))
     local_search.random_paths(problem, 0, before, 0, 2)
-    improved = local_search.Improved(*np.empty((3, 2)))
+    improved = local_search.Improved(*np.empty((2, 2)))
     local_search.improve(problem, NewtonSettings(False, 50, 1e-4), before, improved, 0, 2)
     paths, costs = before.copy(), improved.costs.copy()
     local_search.iterated_local_search(problem, 0, 40, before, paths, costs, 0, 1)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from baselines.papers.runs import Runs
-from baselines.papers.zhang import claims, section_5
-from baselines.papers.zhang.targets import SHARES, TARGETS, at_rest, drawn
+from baselines.papers.zhang import claims, predictive
+from baselines.papers.zhang.episodes import SHARES, TARGETS, at_rest, drawn
 from baselines.registry import make
 from baselines.status import Status
 
@@ -47,4 +47,4 @@ def test_damping_tolerates_a_wrong_model(trial):
 
 def test_an_inverse_of_18_rows_is_fast_enough_where_it_is_compiled():
     """The ledger leaves claims on times out; this one is far from its bounds on any machine."""
-    assert section_5.inverse_of_18(Runs()).verdict == "depends"
+    assert predictive.inverse_of_18(Runs()).verdict == "depends"

@@ -11,7 +11,6 @@ from baselines.training.trainer import Trainer
 #: Options that make a run short.
 TINY: dict[str, Any] = {
     "scenario": "varga7-random",
-    "task": "pose",
     "steps": 100,
     "segments": 3,
     "evaluate_every": 2,

@@ -10,7 +10,7 @@ from baselines.training.config import TrainingError
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
 from baselines.training.randomness import deterministic_torch
-from baselines.training.validation import validate
+from baselines.training.validation import bound, validated
 from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.training.small import play_segments, tiny, trainer_of
@@ -24,17 +24,15 @@ def one_thread():
         yield
 
 
-@pytest.mark.parametrize(
-    ("inverse", "hold"),
-    [({}, 8), ({"damping": 4e-2}, 24)],  # with a damping, features are seen once, where they have no gradient to miss
-    ids=str,
-)
-def test_gradient_of_a_window_is_that_of_its_loss(inverse, hold):
-    """Along a direction in the space of weights, against central differences: through arm, features and network."""
+def test_gradient_of_a_window_is_that_of_its_loss():
+    """Along a direction in the space of weights, against central differences: through arm, law and network.
+
+    Features are seen once, where they have no gradient to miss.
+    """
     # So long a prior makes the weights of the costs constant; they are not differentiated.
     many = {"max_gradient_share": 1e9, "cost_prior_steps": 1e12, "reset_distance": 1e9}
     config = CONFIG.replace(
-        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), hold=hold, **inverse, **many
+        hidden=(16,), n_envs=6, activation="tanh", segment_steps=24, window=(24,), hold=24, damping=4e-2, **many
     )
     losses, slope = {}, 0.0
     for along in (0.0, 1e-6, -1e-6):
@@ -92,14 +90,13 @@ def test_episodes_that_end_in_a_window_are_weighted_separately(monkeypatch):
 
 
 def test_it_learns():
-    """From rest to within centimetres: a gradient of the wrong sign, or none, stays at 4e8."""
-    config = CONFIG.replace(
-        steps=60, hidden=(32, 32), n_envs=32, segments=4, segment_steps=240, window=(16, 48), averaging=0.9
-    )
+    """From a damping that hardly lets it move: a gradient of the wrong sign, or none, stays at 1e7."""
+    short = {"steps": 60, "segments": 4, "segment_steps": 240, "window": (16, 48)}
+    config = CONFIG.replace(hidden=(32, 32), n_envs=32, averaging=0.9, damping=100.0, **short)
     trainer, scenario = trainer_of(config), config.make_scenario()
-    before = validate(trainer.agent(), scenario, 8).cost
+    before = validated(bound(trainer.agent(), scenario), scenario, 8).cost
     losses = [metrics["train/loss"] for metrics in play_segments(trainer, range(4))]
-    assert validate(trainer.agent(), scenario, 8).cost < 2e-3 * before
+    assert validated(bound(trainer.agent(), scenario), scenario, 8).cost < 2e-2 * before
     assert losses[-1] < losses[0]
 
 
@@ -108,7 +105,7 @@ def test_runs_begin_from_an_agent(tmp_path):
     play_segments(trained, [0])
     save_agent(tmp_path / "a.safetensors", trained.agent())
     begun = trainer_of(CONFIG.replace(init=tmp_path / "a.safetensors"), seed=5)
-    wanted = load_agent(tmp_path / "a.safetensors", (Bilinear,)).network
+    wanted = load_agent(tmp_path / "a.safetensors").network
     for layer, weights in zip(begun.policy[::2], wanted.weights, strict=True):
         np.testing.assert_array_equal(layer.weight.detach(), weights)
     for other in ({"hidden": (3,)}, {"offsets": (1, 5)}, {"damping": 1e-3}):
@@ -150,7 +147,7 @@ def test_the_agent_is_the_average_of_the_actor():
 @pytest.mark.parametrize("name", ["tiago-line", "khan8-q7q8", "panda-glue"])
 def test_other_arms_and_tasks(name):
     """Limits, a prismatic joint 1, points that are held, and references without a joint path."""
-    trainer = trainer_of(CONFIG.replace(scenario=name, task=None, segments=1))
+    trainer = trainer_of(CONFIG.replace(scenario=name, segments=1))
     (metrics,) = play_segments(trainer, [0])
     assert metrics["train/refused"] == 0.0
     assert np.isfinite(metrics["train/loss"])

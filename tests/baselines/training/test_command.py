@@ -15,13 +15,14 @@ from baselines.training import run, seeds
 from baselines.training.config import APG
 from baselines.training.folder import FORMAT
 from baselines.training.seeds import RunOptions, Seed
+from baselines.workers import Workers
 from tests.baselines.losing import LosingCluster
 from tests.baselines.training.small import about, timeless, tiny
 from tests.spawning import dies_with_seed_7
 
 ROOT = pathlib.Path(__file__).parents[3]
 TINY = [
-    "--scenario", "varga7-random", "--task", "pose", "--steps", "40", "--hidden", "8", "--offsets", "1", "2", "10",
+    "--scenario", "varga7-random", "--steps", "40", "--hidden", "8", "--offsets", "1", "2", "10",
     "--segments", "2", "--n-envs", "4", "--window", "16", "--segment-steps", "48", "--validation-episodes", "1",
     "--no-progress",
 ]  # fmt: skip
@@ -51,7 +52,7 @@ def test_several_seeds(alone, tmp_path, capsys, monkeypatch):
 @pytest.mark.slow
 def test_a_seed_that_fails_does_not_end_the_others(alone, tmp_path, monkeypatch, capfd):
     """Processes of this machine."""
-    monkeypatch.setattr(seeds, "attempt", dies_with_seed_7)
+    monkeypatch.setattr(seeds, "train_seed", dies_with_seed_7)
     assert main(["apg", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(alone / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
@@ -60,9 +61,11 @@ def test_a_seed_that_fails_does_not_end_the_others(alone, tmp_path, monkeypatch,
     assert "--resume" in printed.err
 
 
-def test_an_error_of_a_seed_is_said(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(seeds, "train_seed", lambda *_: 1 / 0)
-    assert seeds.attempt(Seed(APG(), RunOptions(out=tmp_path), "", 3)).error == "ZeroDivisionError: division by zero"
+def test_an_error_of_the_program_is_said_and_ends_no_other_seed(tmp_path, monkeypatch, capfd):
+    LosingCluster(monkeypatch)
+    monkeypatch.setattr(seeds, "train_seed", lambda job: 1 // (job.seed - 3) * "")
+    errors = seeds.train_seeds(APG(), RunOptions(out=tmp_path), [3, 4], workers=Workers(cluster="ray"))
+    assert errors == {3: "ZeroDivisionError: integer division or modulo by zero", 4: ""}
     assert "Traceback" in capfd.readouterr().err
 
 
@@ -83,7 +86,7 @@ def test_repeat(alone, tmp_path, capsys):
     ("content", "message"),
     [
         ({"weights_sha256": None}, "has not ended"),
-        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 layers, got 3"),
+        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 whole numbers, got 3"),
         ({"format": 1}, f"expected the run.json of a training in format {FORMAT}"),
     ],
 )
@@ -168,8 +171,8 @@ def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
 def test_nodes_of_a_cluster_share_the_folder(tmp_path):
     config, options = tiny(segments=1), RunOptions(out=tmp_path, overwrite=True, progress=False)
     elsewhere = Seed(config, RunOptions(out=tmp_path / "unseen"), "", 1, remote=True)
-    assert "expected a folder that all nodes of the cluster share" in seeds.attempt(elsewhere).error
-    assert not seeds.attempt(Seed(config, seeds._shared(options, [1]), "", 1, remote=True)).error
+    assert "expected a folder that all nodes of the cluster share" in seeds.train_seed(elsewhere)
+    assert not seeds.train_seed(Seed(config, seeds._shared(options, [1]), "", 1, remote=True))
     with pytest.raises(ResultsError, match="already exists"):
         seeds._shared(RunOptions(out=tmp_path), [1])
     seeds._shared(options, [1])

@@ -15,12 +15,12 @@ from tests.baselines.training.small import tiny
 REFUSED = [
     ({"windo": 3}, "no option of apg 'windo'. Did you mean 'window'"),
     ({"activation": "sili"}, "Did you mean 'silu'"),
-    ({"hidden": []}, "hidden: expected 1 to 10 layers"),
+    ({"hidden": []}, "hidden: expected 1 to 10 whole numbers"),
     ({"hidden": [8, 0]}, "hidden: expected a whole number from 1 to 2048, got 0"),
     ({"offsets": [2, 5]}, "offsets: expected steps ahead that rise from 1"),
     ({"keep_best": "yes"}, "keep_best: expected true or false"),
     ({"learning_rate": -1}, "learning_rate: expected a finite number above 0"),
-    ({"window": 64}, "window: expected whole numbers, got 64"),
+    ({"window": 64}, "window: expected 1 to 100 whole numbers, got 64"),
     ({"window": [88]}, "window: expected .* that divide segment_steps, 1920, got 88"),
     ({"averaging": 1.5}, "averaging"),
 ]
@@ -50,7 +50,6 @@ def test_values_of_segments():
 
 def test_presets(tmp_path):
     assert preset_names() == ("quick", "standard", "long", "smoke")
-    assert {configure(name).damping for name in ("quick", "standard", "long")} == {1e-2}
     (tmp_path / "mine.toml").write_text("windo = 2\n")
     with pytest.raises(IkgymError, match="no option of apg 'windo'"):
         configure(str(tmp_path / "mine.toml"))

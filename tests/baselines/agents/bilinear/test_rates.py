@@ -2,14 +2,10 @@
 
 import numpy as np
 import pytest
-import torch
 
-from baselines.agents.bilinear.damped_kernels import held_rows
+from baselines.agents.bilinear.features import FARTHEST, metric_rows, rate_rows
+from baselines.agents.bilinear.kernels import held_rows
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bilinear.rates import FARTHEST, metric_rows, rate_rows
-from baselines.policy import Problem
-from baselines.training.gradients.law import Law
-from ikgym import scenarios
 from ikgym.rl.twists import twist
 from tests.baselines.agents.bilinear.test_bilinear import OFFSETS, ROWS, batch_of, features, problem_of, qdot
 from tests.baselines.random_agents import network, nothing_held
@@ -19,11 +15,11 @@ TWISTS = len(OFFSETS) - 1
 CASES = [("varga7", "pose"), ("varga7", "position"), ("puma560", "matrix"), ("tiago", "axis")]
 
 
-def rates_of(problem, batch, offsets=OFFSETS):
+def rates_of(problem, batch):
     """Joint rates in [rad/s] or [m/s]. Shape (B, p - 1, n)."""
     speed = np.empty(len(batch.q))
-    seen = features(problem, batch, offsets, 1e-3, speed)[:, -(len(offsets) - 1) * problem.model.joints :]
-    return seen.reshape(len(seen), len(offsets) - 1, -1) * speed[:, None, None] / 0.3
+    seen = features(problem, batch, speed)[:, -TWISTS * problem.model.joints :]
+    return seen.reshape(len(seen), TWISTS, -1) * speed[:, None, None] / 0.3
 
 
 def postures(problem, batch):
@@ -47,8 +43,6 @@ def test_rates_are_those_between_predicted_postures(arm, task):
     wanted = np.diff(postures(problem, batch), axis=1) / (np.diff(OFFSETS)[:, None] * problem.dt)
     found = rates_of(problem, batch)
     np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-5 * np.abs(wanted).max())
-    own = TWISTS * problem.model.joints
-    assert np.array_equal(features(problem, batch, OFFSETS, 1e-3)[:, :-own], features(problem, batch))
 
 
 def test_steps_are_bounded_far_off_the_path():
@@ -70,34 +64,16 @@ def test_nan_is_not_taken_for_a_step():
     assert np.isfinite(np.delete(out, 1, axis=0)).all()
 
 
-def test_features_are_constants_for_the_gradient_and_actions_are_not():
-    scenario = scenarios.get("varga7-pose-random")
-    law, problem = Law(scenario, DAMPED), Problem.of(scenario)
-    batch, speeds = batch_of(problem), np.empty(ROWS)
-    q = torch.from_numpy(batch.q).requires_grad_()
-    seen, speed = law.features(q, batch.nominal, batch.remaining)
-    assert not seen.requires_grad
-    wanted = features(problem, batch, OFFSETS, 1e-3, speeds)
-    np.testing.assert_array_equal(seen.numpy().astype(np.float32), wanted)
-    np.testing.assert_array_equal(speed, speeds)
-    assert law.held(q, seen, torch.zeros(ROWS, law.outputs, dtype=torch.float64)).requires_grad
-
-
-@pytest.mark.parametrize(
-    ("arm", "task", "damping"), [("varga7", "pose", None), ("tiago", "axis", 1e-3), ("varga7", "position", 1e-3)]
-)
-def test_one_call_is_the_parts_of_the_law(arm, task, damping):
+@pytest.mark.parametrize(("arm", "task"), CASES)
+def test_one_call_is_the_parts_of_the_law(arm, task):
     """Features, network, metric, inverse and action, bit for bit."""
-    problem, processing = problem_of(arm, task), Bilinear(OFFSETS, damping)
+    problem = problem_of(arm, task)
     batch, kind, chain = batch_of(problem), problem.task.kind, problem.model.chain
-    net = network((processing.size(problem), 16, processing.outputs(problem)))
-    seen = features(problem, batch, OFFSETS, damping)
-    output = net.forward(seen)
-    if damping is not None:
-        metric_rows(kind, chain.prismatic, TWISTS, seen, output)
-        held = np.empty((ROWS, Bilinear(OFFSETS).outputs(problem)))
-        held_rows(kind, chain, damping, batch.q, output, held)
-        output = held
-    found = processing.act(problem, batch, net, 1, nothing_held(processing, problem, ROWS))
-    np.testing.assert_allclose(found, qdot(problem, batch, output) / problem.velocity_limit, rtol=1e-15)
+    net = network((DAMPED.size(problem), 16, DAMPED.outputs(problem)))
+    seen = features(problem, batch)
+    output, held = net.forward(seen), np.empty((ROWS, DAMPED.held(problem)))
+    metric_rows(kind, chain.prismatic, TWISTS, seen, output)
+    held_rows(kind, chain, DAMPED.damping, batch.q, output, held)
+    found = DAMPED.act(problem, batch, net, 1, nothing_held(DAMPED, problem, ROWS))
+    np.testing.assert_allclose(found, qdot(problem, batch, held) / problem.velocity_limit, rtol=1e-15)
     assert np.ptp(found) > 0.0

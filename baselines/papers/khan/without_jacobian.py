@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.papers.comparisons import SAME, YANK, extent, rms
-from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, nominal_joints, short, singular_places
+from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, short, singular_places
 from baselines.papers.paper import Finding, scaled
-from baselines.papers.runs import Runs
+from baselines.papers.runs import Runs, nominal_joints
 from baselines.status import Status
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import Sinusoid
