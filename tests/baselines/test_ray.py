@@ -105,20 +105,20 @@ class Unknown:
 @needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
     nodes, other, folder = cluster
-    check, done = playing._ClusterCheck.check, []
+    check, done = playing.check_versions, []
 
-    def kill_half_way(self, batch, *results):
+    def kill_half_way(batch, results):
         done.append(batch[0].key)
         if len(done) == EPISODES // 2:
             assert wait_for((folder / AT_WORK).exists, PATIENCE)
             nodes.remove_node(other, allow_graceful=False)
-        check(self, batch, *results)
+        check(batch, results)
 
     given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50}
     alone = evaluate(**given)
     for name, instead in {"BLOCK": 1, "work": work}.items():
         monkeypatch.setattr(playing, name, instead)
-    monkeypatch.setattr(playing._ClusterCheck, "check", kill_half_way)
+    monkeypatch.setattr(playing, "check_versions", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
     assert caplog.text.count("its job is retried") == 1
