@@ -79,7 +79,7 @@ def test_rows_are_read_again_also_those_of_before(rows):
 
 def test_tables_state_stops_where_there_can_be_any(rows):
     stopped, clear, free = rows[0]
-    assert [one.stopped for one in summarise(rows[0])] == [1, 0, None]
+    assert [one["stopped"] for one in summarise(rows[0])] == [1, 0, None]
     text = report.table([stopped, clear])
     assert "clearance" in text
     assert "stopped: episodes in which they would have met" in " ".join(text.split())
