@@ -285,6 +285,14 @@ def test_a_wrapped_environment_is_scored_below_its_wrappers(solved):
         evaluate(HELIX, Flat(), steps=STEPS)
 
 
+def test_wrappers_change_no_number_of_an_imperfect_plant():
+    scenario = ikgym.scenarios.get("panda-circle").replace(steps=STEPS, plant=ikgym.Plant(q_noise=1e-3))
+    wraps = (None, gym.wrappers.OrderEnforcing)
+    (plain,), (wrapped,) = (evaluate(scenario, Borrowed(scenario), wrap=wrap) for wrap in wraps)
+    assert plain.joint_limit_margin_min is not None
+    assert numbers(wrapped) == numbers(plain)
+
+
 class NoSeed(gym.Wrapper):
     def reset(self, *, seed=None, options=None):
         return self.env.reset()
