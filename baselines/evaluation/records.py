@@ -19,6 +19,7 @@ from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.summary import Record, by_seed, grouped, labels, record
 from baselines.evaluation.table import NOTHING, code, escaped, grid, number
+from baselines.files import csv_text
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -131,11 +132,7 @@ def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -
 
 def to_csv(lines: Sequence[Record]) -> str:
     """The records as CSV: numbers with six significant digits, None as an empty cell."""
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({name: _plain(value) for name, value in line.items()} for line in lines)
-    return text.getvalue()
+    return csv_text(lines[0], ([_plain(line[name]) for name in lines[0]] for line in lines))
 
 
 def from_csv(text: str) -> list[dict[str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import hashlib
 import io
@@ -16,7 +15,7 @@ import numpy.typing as npt
 
 import ikgym
 from baselines.canonical import canonical
-from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
+from baselines.evaluation.export import FORMATS, USUAL, Format, trajectory_log
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.motion.free_timing import as_long
@@ -24,6 +23,7 @@ from baselines.files import (
     ResultsError,
     check_flags,
     check_writable,
+    csv_text,
     from_json,
     read_arrays,
     read_json,
@@ -143,13 +143,10 @@ class Results:
 
     def save_csv(self) -> None:
         """Writes results.csv: the rows as a table, None as an empty cell, objects and lists as JSON."""
-        text = io.StringIO(newline="")
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for row in self.rows:
-            cells = row.to_json().values()
-            table.writerow([canonical(cell) if isinstance(cell, (dict, list)) else cell for cell in cells])
-        write(self.directory / "results.csv", text.getvalue().encode())
+        lines = [
+            [canonical(v) if isinstance(v, (dict, list)) else v for v in row.to_json().values()] for row in self.rows
+        ]
+        write(self.directory / "results.csv", csv_text(COLUMNS, lines).encode())
 
     def series_file(self, row: Row) -> pathlib.Path:
         """The file with the trajectory log of the first episode of a row's policy in its scenario."""
@@ -169,7 +166,8 @@ class Results:
         file, advice = self.series_file(row), "Delete it and run again with --resume."
         log = read_arrays(file, advice)
         with reading(file, advice):
-            check_log(log)
+            if missing := [name for name in USUAL if name not in log]:
+                raise ValueError(f"the array {missing[0]} is missing")
         return log
 
     def _clear(self) -> None:

@@ -202,13 +202,9 @@ def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch)
     (file,) = tmp_path.glob("series/*/*.npz")
     with np.load(file) as arrays:
         log = dict(arrays)
-    for arrays, message in (
-        ({**log, "other": np.zeros(3)}, "There is no array of a log 'other'"),
-        ({name: array for name, array in log.items() if name != "nominal"}, "the array nominal is missing"),
-    ):
-        np.savez(file, **arrays)
-        with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*{message}"):
-            evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
+    np.savez(file, **{name: array for name, array in log.items() if name != "nominal"})
+    with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*the array nominal is missing"):
+        evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
     file.write_bytes(b"nothing")
     with pytest.raises(ResultsError, match=re.escape(str(file))):
         evaluate(**given, policies="dls", resume=True)
