@@ -15,7 +15,6 @@ from baselines.episodes import Tick, check_finite, rollout
 from baselines.policy import Report
 from baselines.recording import Episode, Seeds
 from baselines.status import Status
-from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.spaces import action_space, observation_space
@@ -106,36 +105,18 @@ class ForeignPolicy:
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Records the actions that reach an environment through other wrappers."""
+    """Records the actions that reach an environment through other wrappers, and their tracking costs."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
-        base = env.unwrapped
-        assert isinstance(base, RedundantIKEnv)
-        self.steps = base.scenario.steps
         self.actions: list[npt.NDArray[Any]] = []
-        self.seeds: list[int | None] = []
-
-    @property
-    def ended(self) -> bool:
-        """Whether the episode is over."""
-        return len(self.actions) == self.steps
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins the episode; refused if a wrapper starts elsewhere than the scenario, or resets during the episode."""
-        if options:
-            raise InvalidInputError(f"wrap: expected resets without options, got {options!r}.")
-        if 0 < len(self.actions) < self.steps:
-            raise InvalidInputError(f"wrap: the episode was reset after {len(self.actions)} of {self.steps} steps.")
-        if not self.ended:
-            self.seeds.append(seed)
-        return self.env.reset(seed=seed)
+        self.costs: list[float] = []
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Makes one step and records its action."""
+        """Makes one step and records it."""
         result = self.env.step(action)
-        if not self.ended:
-            self.actions.append(np.array(action))
+        self.actions.append(np.array(action))
+        self.costs.append(result[-1]["tracking_cost"])
         return result
 
 
@@ -166,25 +147,25 @@ def play_wrapped(
         raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
     env, recorder = policy.environment(scenario)
     seen, _ = env.reset(seed=seeds.seed)
-    if recorder.seeds != [seeds.seed] or recorder.actions:
-        raise InvalidInputError(
-            f"wrap: expected reset(seed={seeds.seed}) to reach the environment once and no step to be made, got resets "
-            f"with the seeds {recorder.seeds} and {len(recorder.actions)} steps."
-        )
     state, times, over = None, [], False
-    while not (recorder.ended or over):
+    while not over:
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
         check_finite(action, policy, scenario, [seeds], len(recorder.actions))
         seen, _, terminated, truncated, _ = env.step(action)
         over = terminated or truncated
-    if not recorder.ended:
+    if len(recorder.actions) != scenario.steps:
         raise InvalidInputError(
             f"wrap: the episode of {scenario.name} ended after {len(recorder.actions)} of {scenario.steps} steps."
         )
     again = dataclasses.replace(policy, model=_Recorded(recorder.actions))
     episode = rollout(scenario, again, seeds, timed=False, tick=tick)
+    if not np.array_equal(episode.tracking_cost, recorder.costs):
+        raise InvalidInputError(
+            f"wrap: expected the episode of {scenario.name} with seed {seeds.seed} from its start, got another one: a "
+            "wrapper resets without the seed, with options, or makes steps in a reset."
+        )
     return dataclasses.replace(episode, time_ns=np.array(times if timed else [], dtype=np.int64))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 import sys
 from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -22,6 +21,7 @@ from baselines.evaluation.motion.free_timing import play_to_end
 from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
+from baselines.oracle.stripped import ideal
 from baselines.policy.protocol import Policy
 from baselines.recording import Episode, Seeds
 from baselines.workers import WorkerError, Workers, finished
@@ -92,7 +92,8 @@ def play(batch: Batch, tick: Tick | None = None) -> Results:
         else:
             seeds = [job.seeds for job in batch]
             episodes = play_episodes(first.scenario, policy, seeds, first.preview, timed=first.timed, tick=tick)
-    return [(_row(job, one), one if job.record else None) for job, one in zip(batch, episodes, strict=True)]
+    digests = {"fingerprint": first.fingerprint, "ideal": fingerprint(ideal(first.scenario))}
+    return [(_row(job, one, **digests), one if job.record else None) for job, one in zip(batch, episodes, strict=True)]
 
 
 def play_episodes(
@@ -148,7 +149,7 @@ def _in_sequence(batch: Batch, policy: Policy, tick: Tick | None) -> list[Episod
     return [played[job.seeds] for job in batch]
 
 
-def _row(job: Job, episode: Episode) -> Row:
+def _row(job: Job, episode: Episode, **digests: str) -> Row:
     return measure(
         job.scenario,
         job.policy,
@@ -157,10 +158,9 @@ def _row(job: Job, episode: Episode) -> Row:
         episode,
         machine=describe(),
         preview=furthest(job.preview),
-        fingerprint=job.fingerprint,
         test_set=job.test_set,
         best_known=best_known.cost(job.scenario, job.seeds.seed, job.seeds.arm_seed),
-        ideal=job.ideal,
+        **digests,
     )
 
 
@@ -178,7 +178,7 @@ def _elsewhere(away: Sequence[Batch], workers: Workers) -> Iterator[tuple[Batch,
     if not away:
         return
     check_picklable({batch[0].specification: None for batch in away})
-    with contextlib.closing(finished(work, away, workers)) as all_done:
+    with contextlib.closing(finished(play, away, workers)) as all_done:
         for batch, future in all_done:
             try:
                 results = future.result()
@@ -191,15 +191,10 @@ def _elsewhere(away: Sequence[Batch], workers: Workers) -> Iterator[tuple[Batch,
             yield batch, results
 
 
-def work(batch: Batch) -> Results:
-    """Plays a batch in a worker process; the rows have the worker's own digest of the scenario."""
-    digest = fingerprint(batch[0].scenario)
-    return [(dataclasses.replace(row, fingerprint=digest), episode) for row, episode in play(batch)]
-
-
 def check_versions(batch: Batch, results: Results) -> None:
     """Refuses results of a worker with another version of the code, such as a node of a cluster may have."""
-    expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
+    digest = batch[0].fingerprint
+    expected = [(job.key, digest, ikgym.__version__) for job in batch]
     if [(row.key, row.fingerprint, row.machine.get("ikgym")) for row, _ in results] != expected:
         raise WorkerError(
             f"A worker has played something else than {batch[0].policy} in {batch[0].scenario.name}: it has ikgym "

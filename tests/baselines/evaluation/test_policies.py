@@ -298,14 +298,21 @@ class NoSeed(gym.Wrapper):
         return self.env.reset()
 
 
+class Skipping(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        self.env.reset(seed=seed)
+        return self.env.reset(options={"step": 3})
+
+
 def test_wrappers_that_change_the_episode_are_refused():
     for wrap, message in (
         (lambda env: 3, "wrap: expected the environment that it was given in wrappers, got 3"),
         (lambda env: gym.wrappers.TimeLimit(env, 5), "ended after 5 of 20 steps"),
-        (NoSeed, r"expected reset\(seed=0\) to reach the environment"),
+        (NoSeed, "expected the episode of varga7-random with seed 2000000 from its start, got another"),
+        (Skipping, "ended after 17 of 20 steps"),
     ):
         with pytest.raises(InvalidInputError, match=message):
-            evaluate(HELIX, Borrowed(), steps=STEPS, wrap=wrap)
+            evaluate("varga7-random", Borrowed("varga7-random"), steps=STEPS, wrap=wrap)
 
 
 # Models of Stable-Baselines3
