@@ -34,11 +34,12 @@ def costs(rows):
     return [(row.seed, row.total_cost, row.tracking_cost) for row in rows]
 
 
-def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path):
+def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path, caplog):
     pool.lost = {0, 2}
     rows = play(cluster="ray", out=tmp_path)
     assert costs(rows) == costs(play())
     assert len(pool.units) == 5  # three episodes, two of them twice
+    assert caplog.text.count("its job is retried") == 2
     # Times are those of this machine alone, and a table without them has a dash.
     assert [row.time_p50_us is None for row in rows] == [False, True, True, True]
     assert read_rows(tmp_path / "results.json") == rows

@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout, rollouts
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.export import trajectory_log
@@ -89,16 +89,6 @@ def test_tables_state_stops_where_there_can_be_any(rows):
     assert second["clearance_mm"] == 1e3 * clear.clearance_min
     assert "stopped [%]" in markdown([first, second])
     assert "stopped_percent" not in records([free])[0]
-
-
-def test_episodes_side_by_side_have_what_single_ones_have():
-    scenario = blocked()
-    policy = baselines.make("dls", scenario)
-    single = rollout(scenario, policy, 0)
-    for one in rollouts(scenario, policy, [0, 1]):
-        for name in ("clearance", "pair", "stopped"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(single, name))
-    assert single.stopped.any()
 
 
 def test_a_wrapped_policy_is_measured_alike(rows):
