@@ -78,7 +78,7 @@ def rollout(
     timed: bool = True,
     tick: Tick | None = None,
 ) -> Episode:
-    """Plays one episode by single calls of the policy.
+    """Plays one episode.
 
     Bit-identical to `gym.make("RedundantIK-v0", scenario=…)`, reset with the seed and stepped with the policy; without
     Gymnasium's wrappers and the float32 rewards of Stable-Baselines3.
@@ -95,7 +95,7 @@ def rollout(
         InvalidInputError: The preview is invalid or shorter than the policy needs; an action is not finite or has a
             wrong shape.
     """
-    return _chain(scenario, policy, [[seed]], preview, tick, single=True, timed=timed)[0][0]
+    return rollouts(scenario, policy, [seed], preview=preview, timed=timed, tick=tick)[0]
 
 
 def rollouts(
@@ -151,12 +151,14 @@ def sequences(
         InvalidInputError: See :func:`rollout`.
     """
     single = timed or not policy.batched
-    groups = [[chain] for chain in chains] if single else [chains]
-    return [
-        episodes
-        for group in groups
-        for episodes in _chain(scenario, policy, group, preview, tick, single=single, timed=timed)
-    ]
+    out: list[list[Episode]] = []
+    for group in [[chain] for chain in chains] if single else [chains]:
+        played, state = [], None
+        for seeds in zip(*group, strict=True):
+            episodes, state = _play(scenario, policy, seeds, preview, tick, single=single, timed=timed, state=state)
+            played.append(episodes)
+        out += [list(episodes) for episodes in zip(*played, strict=True)]
+    return out
 
 
 def check_finite(
@@ -183,24 +185,6 @@ def check_finite(
         f"{policy.name} in {scenario.name}, seed {seed}, step {steps + 1}: expected finite actions, got "
         f"{rows[row].tolist()}."
     )
-
-
-def _chain(
-    scenario: Scenario,
-    policy: Policy,
-    chains: Sequence[Sequence[int | Seeds]],
-    preview: Preview | None,
-    tick: Tick | None,
-    *,
-    single: bool,
-    timed: bool,
-) -> list[list[Episode]]:
-    """The episodes of each sequence; the sequences are played side by side."""
-    played, state = [], None
-    for seeds in zip(*chains, strict=True):
-        episodes, state = _play(scenario, policy, seeds, preview, tick, single=single, timed=timed, state=state)
-        played.append(episodes)
-    return [list(episodes) for episodes in zip(*played, strict=True)]
 
 
 def _play(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import dataclasses
 import errno
 import io
@@ -13,7 +14,7 @@ import pathlib
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -59,6 +60,15 @@ def write_json(file: pathlib.Path, value: object) -> None:
         ResultsError: The file cannot be written.
     """
     write(file, (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+
+
+def csv_text(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:
+    """Lines of cells as CSV: numbers with all digits, None as an empty cell."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(lines)
+    return text.getvalue()
 
 
 def read_bytes(file: pathlib.Path, most: int = LARGEST) -> bytes:

@@ -1,11 +1,10 @@
-"""Statistics over episodes: geometric means, bootstrap intervals, worst cases."""
+"""Statistics over episodes: geometric means and bootstrap intervals."""
 
 from __future__ import annotations
 
+import functools
 import math
-import statistics
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Self
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,7 +35,12 @@ def geometric_interval(values: Sequence[float] | FloatArray) -> tuple[float, flo
     Returns:
         The 2.5th and the 97.5th percentile.
     """
-    logs = np.log(np.atleast_2d(values))
+    return _interval(tuple(map(tuple, np.atleast_2d(values).tolist())))
+
+
+@functools.lru_cache(maxsize=256)  # one evaluation states an interval in several tables
+def _interval(values: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
+    logs = np.log(values)
     seeds, episodes = logs.shape
     generator = np.random.default_rng(0)
     drawn = generator.integers(episodes, size=(RESAMPLES, episodes))
@@ -44,20 +48,3 @@ def geometric_interval(values: Sequence[float] | FloatArray) -> tuple[float, flo
     rows = generator.integers(seeds, size=(RESAMPLES, seeds))
     low, high = np.exp(np.percentile(np.take_along_axis(means, rows, axis=1).mean(axis=1), (2.5, 97.5)))
     return float(low), float(high)
-
-
-class Spread(NamedTuple):
-    """Geometric mean, median, 90th percentile and maximum of a number over episodes, and the seed of the maximum."""
-
-    mean: float
-    median: float
-    p90: float
-    worst: float
-    worst_seed: int
-
-    @classmethod
-    def of(cls, values: Mapping[int, float]) -> Self:
-        """The spread of numbers by their reset seeds."""
-        numbers, seed = list(values.values()), max(values, key=lambda seed: values[seed])
-        p90 = float(np.percentile(numbers, 90))
-        return cls(geometric_mean(numbers), statistics.median(numbers), p90, values[seed], seed)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
-import io
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -12,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.evaluation.motion import Motion, joint_trajectory, mcap
-from baselines.evaluation.motion.carried import carried
+from baselines.evaluation.motion.contacts import carried
 from baselines.evaluation.motion.played import by_joint
+from baselines.files import csv_text
 from baselines.recording import Episode, Seeds
 from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
@@ -27,12 +26,8 @@ TrajectoryLog = dict[str, npt.NDArray[Any]]
 
 def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
     """Columns as CSV, one line a row; numbers keep all digits, NaN is an empty cell."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for cells in zip(*(values.tolist() for values in columns.values()), strict=True):
-        writer.writerow(["" if cell != cell else cell for cell in cells])
-    return text.getvalue().encode()
+    lines = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return csv_text(columns, (["" if cell != cell else cell for cell in line] for line in lines)).encode()
 
 
 def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
@@ -96,7 +91,7 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
         Where the scenario has collisions, ``clearance`` (k,) in [m], and what
-        :func:`baselines.evaluation.motion.carried.carried` gives for the replay.
+        :func:`baselines.evaluation.motion.contacts.carried` gives for the replay.
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
@@ -129,26 +124,11 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     return log | {"clearance": episode.clearance[kept]} | carried(scenario, seeds, log["q"][frames], after[frames])
 
 
-#: Arrays of every log; of those with collisions; and of some.
+#: Arrays of every log.
 USUAL = (
     *("time", "nominal", "pose", "q", "qdot", "position_error", "joint_names", "prismatic", "lower", "upper"),
     *("velocity_limit", "frame", "joint_points", "tool", "tool_rotation"),
 )
-CONTACTS = ("clearance", "solids", "carriers", "carrier_frames", "closest")
-OPTIONAL = ("orientation_error", "qddot", "acceleration_limit", "nominal_q")
-
-
-def check_log(log: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Checks the names of the arrays of a log that was read.
-
-    Raises:
-        ValueError: One is missing or unknown.
-    """
-    known_names("array of a log", log, (*USUAL, *CONTACTS, *OPTIONAL))
-    if missing := [name for name in USUAL if name not in log]:
-        raise ValueError(f"the array {missing[0]} is missing")
-    if 0 < sum(name in log for name in CONTACTS) < len(CONTACTS):
-        raise ValueError(f"expected all or none of the arrays {', '.join(CONTACTS)}")
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Tick, check_finite
+from baselines.episodes import Tick, check_finite, rollout
 from baselines.policy import Report
 from baselines.recording import Episode, Seeds
 from baselines.status import Status
-from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
-from ikgym.obstacles.solids import closest, solids_of
 from ikgym.scenarios import Preview, Scenario
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
@@ -108,50 +105,40 @@ class ForeignPolicy:
 
 
 class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Records an environment in float64, inside of other wrappers."""
+    """Records the actions that reach an environment through other wrappers, and their tracking costs."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
-        base = env.unwrapped
-        assert isinstance(base, RedundantIKEnv)
-        self.steps = base.scenario.steps
-        self.rows: list[tuple[FloatArray, ...]] = []
-        self.seeds: list[int | None] = []
-
-    @property
-    def ended(self) -> bool:
-        """Whether the episode is over."""
-        return len(self.rows) == self.steps
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins the episode; refused if a wrapper starts elsewhere than the scenario, or resets during the episode."""
-        if options:
-            raise InvalidInputError(f"wrap: expected resets without options, got {options!r}.")
-        if 0 < len(self.rows) < self.steps:
-            raise InvalidInputError(f"wrap: the episode was reset after {len(self.rows)} of {self.steps} steps.")
-        if not self.ended:
-            self.seeds.append(seed)
-        return self.env.reset(seed=seed)
+        self.actions: list[npt.NDArray[Any]] = []
+        self.costs: list[float] = []
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Makes one step and records it."""
         result = self.env.step(action)
-        seen, info = result[0], result[-1]
-        if not self.ended:
-            numbers = [info[key] for key in ("tracking_cost", "velocity_cost", "position_error")]
-            numbers.append(info.get("orientation_error", math.nan))  # absent where the task has none
-            # Copies: wrappers may write into the arrays that they receive.
-            copies = [seen[key].copy() for key in ("q", "qdot", "pose")]
-            numbers += [info.get("clearance", math.nan), info.get("collision", False)]  # likewise
-            numbers.append(info.get("proximity_cost", 0.0))
-            self.rows.append((*copies, *map(np.asarray, numbers), info["at_limit"].astype(np.float64)))
+        self.actions.append(np.array(action))
+        self.costs.append(result[-1]["tracking_cost"])
         return result
+
+
+class _Recorded:
+    """Chooses recorded actions, one after the other."""
+
+    def __init__(self, actions: Sequence[npt.NDArray[Any]]) -> None:
+        self._actions = actions
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """The action of the step; the state counts steps."""
+        del observation, episode_start, deterministic
+        step = state or 0
+        return self._actions[step], step + 1
 
 
 def play_wrapped(
     scenario: Scenario, policy: ForeignPolicy, seed: int | Seeds, *, timed: bool = True, tick: Tick | None = None
 ) -> Episode:
-    """Plays one episode in the wrapped environment; costs and errors are those inside of the wrappers, in float64.
+    """Plays one episode in the wrapped environment. Its actions, played again without wrappers, give the record.
 
     Seeds other than the reset seed cannot be passed through wrappers.
     """
@@ -160,54 +147,26 @@ def play_wrapped(
         raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
     env, recorder = policy.environment(scenario)
     seen, _ = env.reset(seed=seeds.seed)
-    if recorder.seeds != [seeds.seed] or recorder.rows:
-        raise InvalidInputError(
-            f"wrap: expected reset(seed={seeds.seed}) to reach the environment once and no step to be made, got resets "
-            f"with the seeds {recorder.seeds} and {len(recorder.rows)} steps."
-        )
     state, times, over = None, [], False
-    while not (recorder.ended or over):
+    while not over:
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
-        check_finite(action, policy, scenario, [seeds], len(recorder.rows))
+        check_finite(action, policy, scenario, [seeds], len(recorder.actions))
         seen, _, terminated, truncated, _ = env.step(action)
         over = terminated or truncated
-    if not recorder.ended:
+    if len(recorder.actions) != scenario.steps:
         raise InvalidInputError(
-            f"wrap: the episode of {scenario.name} ended after {len(recorder.rows)} of {scenario.steps} steps."
+            f"wrap: the episode of {scenario.name} ended after {len(recorder.actions)} of {scenario.steps} steps."
         )
-    if tick is not None:
-        tick(scenario.steps)
-    columns = map(np.array, zip(*recorder.rows, strict=True))
-    q, qdot, pose, tracking, velocity, position, orientation, clearance, stopped, near, at_limit = columns
-    met = {"clearance": clearance, "stopped": stopped}
-    if scenario.collides:
-        met["pair"] = _pairs(scenario, seeds.seed, q)
-    if scenario.proximity is not None:
-        met["proximity_cost"] = near
-    return Episode(
-        q,
-        qdot,
-        pose,
-        tracking,
-        velocity,
-        position,
-        orientation,
-        at_limit,
-        status=np.full(scenario.steps, int(Status.UNKNOWN)),
-        iterations=np.zeros(scenario.steps, dtype=np.int64),
-        time_ns=np.array(times if timed else [], dtype=np.int64),
-        diagnostics={},
-        **(met if scenario.collides else {}),
-    )
-
-
-def _pairs(scenario: Scenario, seed: int, q: FloatArray) -> FloatArray:
-    """The closest pairs after each step, which no info has. Shape (steps, 2)."""
-    boxes = solids_of(scenario.obstacles_of(seed), scenario.times(len(q) + 1)[1:], scenario.model)
-    arm = scenario.drawn_plant(seed).arm
-    return closest(arm, q, boxes, scenario.surroundings.checked).pairs.astype(np.float64)
+    again = dataclasses.replace(policy, model=_Recorded(recorder.actions))
+    episode = rollout(scenario, again, seeds, timed=False, tick=tick)
+    if not np.array_equal(episode.tracking_cost, recorder.costs):
+        raise InvalidInputError(
+            f"wrap: expected the episode of {scenario.name} with seed {seeds.seed} from its start, got another one: a "
+            "wrapper resets without the seed, with options, or makes steps in a reset."
+        )
+    return dataclasses.replace(episode, time_ns=np.array(times if timed else [], dtype=np.int64))
 
 
 def _shapes(space: gym.Space[Any]) -> Any:

@@ -112,15 +112,12 @@ class Job:
 
     scenario: Scenario
     specification: Specification  # the policy, not yet bound to the scenario
-    given: Mapping[str, Any]  # the parameters of its constructor for this episode
     parameters: Mapping[str, Any]  # all of its parameters, as rows state them
     seeds: Seeds
     first: bool  # whether it is the first episode of its policy in its scenario; its trajectory log is kept
     record: bool  # whether the record of the episode is needed, for the log or for an export
     timed: bool  # whether it is played by itself and timed
     preview: Preview  # steps ahead that the policy is shown, or which ones
-    fingerprint: str
-    ideal: str  # digest of the scenario with an ideal plant
     test_set: str | None = None  # digest of the test set of the episode; None if it belongs to none
     # number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy keeps
     # its state
@@ -130,6 +127,16 @@ class Job:
     def policy(self) -> str:
         """The name of the policy."""
         return self.specification.name
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The parameters of the policy's constructor for this episode."""
+        return self.specification.given(self.scenario, self.seeds)
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest of the scenario, see :func:`baselines.fingerprints.fingerprint`."""
+        return fingerprint(self.scenario)
 
     @property
     def key(self) -> metrics.Key:
@@ -169,7 +176,6 @@ def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
     skipped: list[Skipped] = []
     for some in _with_ideal(played) if options.pairs else played:
         scenario = some.scenario
-        digest, of_ideal = fingerprint(scenario), fingerprint(ideal(scenario))
         for one in all_policies:
             if reason := one.unsuited(scenario, some.seeds[0], options.preview):
                 skipped.append(Skipped(scenario.name, one.name, reason))
@@ -181,15 +187,12 @@ def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
                 job = Job(
                     scenario=scenario,
                     specification=one,
-                    given=one.given(scenario, seeds),
                     parameters=parameters,
                     seeds=seeds,
                     first=number == 0,
                     record=number == 0 or bool(options.export),
                     timed=number < timed,
                     preview=shown,
-                    fingerprint=digest,
-                    ideal=of_ideal,
                     test_set=some.test_set,
                     # A reference is bound to one episode, and has nothing to learn from those before.
                     before=0 if per_episode or seeds.arm_seed is None else seeds.seed - seeds.arm_seed * some.length,

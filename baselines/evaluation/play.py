@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import functools
 import itertools
-import math
 import sys
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Generator, Iterable, Iterator, Sequence
 
-import llvmlite.binding as llvm
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
@@ -26,10 +21,10 @@ from baselines.evaluation.motion.free_timing import play_to_end
 from baselines.evaluation.policies import check_picklable
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
-from baselines.oracle.best_known import MEANINGLESS
+from baselines.oracle.stripped import ideal
 from baselines.policy.protocol import Policy
 from baselines.recording import Episode, Seeds
-from baselines.workers import TOLERANCE, WorkerError, Workers, finished
+from baselines.workers import WorkerError, Workers, finished
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import logger
 from ikgym.scenarios import Preview, Scenario
@@ -39,8 +34,6 @@ from ikgym.scenarios.preview import furthest
 MOST = 64
 #: The same on a cluster, where small batches are spread better, and cost less if a node is lost.
 BLOCK = 8
-#: Episodes that are played again here for each kind of machine in a cluster, no two of one policy.
-REPLAYED = 3
 
 #: Jobs that are played together.
 Batch = tuple[Job, ...]
@@ -55,7 +48,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
 
     Raises:
         InvalidInputError: A policy refuses what it is shown, cannot be sent to a worker, or chooses an invalid action.
-        WorkerError: Workers died repeatedly over one batch, or have other costs than this machine.
+        WorkerError: Workers died repeatedly over one batch, or have another version of the code.
         ClusterError: There is no cluster.
     """
     away, here = _shared(jobs, workers)
@@ -99,7 +92,8 @@ def play(batch: Batch, tick: Tick | None = None) -> Results:
         else:
             seeds = [job.seeds for job in batch]
             episodes = play_episodes(first.scenario, policy, seeds, first.preview, timed=first.timed, tick=tick)
-    return [(_row(job, one), one if job.record else None) for job, one in zip(batch, episodes, strict=True)]
+    digests = {"fingerprint": first.fingerprint, "ideal": fingerprint(ideal(first.scenario))}
+    return [(_row(job, one, **digests), one if job.record else None) for job, one in zip(batch, episodes, strict=True)]
 
 
 def play_episodes(
@@ -155,7 +149,7 @@ def _in_sequence(batch: Batch, policy: Policy, tick: Tick | None) -> list[Episod
     return [played[job.seeds] for job in batch]
 
 
-def _row(job: Job, episode: Episode) -> Row:
+def _row(job: Job, episode: Episode, **digests: str) -> Row:
     return measure(
         job.scenario,
         job.policy,
@@ -164,10 +158,9 @@ def _row(job: Job, episode: Episode) -> Row:
         episode,
         machine=describe(),
         preview=furthest(job.preview),
-        fingerprint=job.fingerprint,
         test_set=job.test_set,
         best_known=best_known.cost(job.scenario, job.seeds.seed, job.seeds.arm_seed),
-        ideal=job.ideal,
+        **digests,
     )
 
 
@@ -181,74 +174,29 @@ def _shared(jobs: Sequence[Job], workers: Workers) -> tuple[list[Batch], list[Ba
 
 
 def _elsewhere(away: Sequence[Batch], workers: Workers) -> Iterator[tuple[Batch, Results]]:
-    """The batches that workers play; results from a cluster are checked."""
+    """The batches that workers play."""
     if not away:
         return
     check_picklable({batch[0].specification: None for batch in away})
-    check = _ClusterCheck() if workers.cluster is not None else None
-    with contextlib.closing(finished(work, away, workers)) as all_done:
+    with contextlib.closing(finished(play, away, workers)) as all_done:
         for batch, future in all_done:
             try:
-                results, node = future.result()
+                results = future.result()
             except WorkerError as e:
                 raise WorkerError(
                     f"{batch[0].policy} in {batch[0].scenario.name}: {e} If memory is short, try fewer --workers. "
                     "Finished episodes are kept; continue with --resume."
                 ) from None
-            if check is not None:
-                check.check(batch, results, node)
+            check_versions(batch, results)
             yield batch, results
 
 
-def work(batch: Batch) -> tuple[Results, str]:
-    """Plays a batch in a worker process: rows with the worker's own digest of the scenario, and its processor."""
-    digest = fingerprint(batch[0].scenario)
-    return [(dataclasses.replace(row, fingerprint=digest), one) for row, one in play(batch)], processor()
-
-
-@functools.cache
-def processor() -> str:
-    """The target of compiled code; the name of a processor does not identify it on virtual machines."""
-    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-
-
-class _ClusterCheck:
-    """Checks results of a cluster: its nodes may have other versions of the code, and other processors."""
-
-    def __init__(self) -> None:
-        self._here = _kind(describe()), processor()
-        self._replayed: dict[tuple[str, str], set[str]] = {}
-
-    def check(self, batch: Batch, results: Results, node: str) -> None:
-        """Checks the results of a batch, and plays an episode again for each kind of machine."""
-        first, (row, _) = batch[0], results[0]
-        expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
-        if [(one.key, one.fingerprint, one.machine.get("ikgym")) for one, _ in results] != expected:
-            raise WorkerError(
-                f"A worker has played something else than {first.policy} in {first.scenario.name}: it has ikgym "
-                f"{row.machine.get('ikgym')}, here is {ikgym.__version__}. Install the same on all nodes."
-            )
-        kind = _kind(row.machine), node
-        replayed = self._replayed.setdefault(kind, set())
-        if len(replayed) < REPLAYED and first.policy not in replayed:
-            replayed.add(first.policy)
-            ((again, _),) = play((first,))
-            compare(row, again, 0.0 if kind == self._here else TOLERANCE)
-
-
-def compare(there: Row, here: Row, tolerance: float) -> None:
-    """Compares costs of a cluster with those of this machine; those that are not finite have to be equal."""
-    for name in ("total_cost", "tracking_cost", "velocity_cost"):
-        far, near = getattr(there, name), getattr(here, name)
-        both_nan = math.isnan(far) and math.isnan(near)
-        if not both_nan and not math.isclose(far, near, rel_tol=tolerance, abs_tol=MEANINGLESS if tolerance else 0.0):
-            raise WorkerError(
-                f"{there.policy} in {there.scenario}, seed {there.seed}: {name} is {far!r} on {_kind(there.machine)} "
-                f"and {near!r} here; expected a relative difference of at most {tolerance:g}. Nothing of that batch is "
-                "kept: install the same versions on all nodes."
-            )
-
-
-def _kind(machine: Mapping[str, Any]) -> str:
-    """The properties of a machine that decide about the last bits of a number."""
-    return canonical({name: value for name, value in machine.items() if name != "cores"})
+def check_versions(batch: Batch, results: Results) -> None:
+    """Refuses results of a worker with another version of the code, such as a node of a cluster may have."""
+    digest = batch[0].fingerprint
+    expected = [(job.key, digest, ikgym.__version__) for job in batch]
+    if [(row.key, row.fingerprint, row.machine.get("ikgym")) for row, _ in results] != expected:
+        raise WorkerError(
+            f"A worker has played something else than {batch[0].policy} in {batch[0].scenario.name}: it has ikgym "
+            f"{results[0][0].machine.get('ikgym')}, here is {ikgym.__version__}. Install the same on all nodes."
+        )

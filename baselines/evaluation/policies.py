@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from baselines import registry
 from baselines.evaluation.foreign import Predictor, Wrap
-from baselines.evaluation.specification import ObjectSpecification, SolverSpecification, Specification, shown_preview
+from baselines.evaluation.specification import Specification, shown_preview
 from baselines.policy import SolverPolicy
 from baselines.policy.protocol import Policy
 from baselines.recording import Seeds
@@ -43,11 +43,11 @@ def specifications(given: AnyPolicy | Iterable[AnyPolicy], *, wrap: Wrap | None 
             out.append(specification(item, wrap=wrap))
         elif id(item) not in objects:
             found = specification(item, wrap=wrap)
-            if isinstance(found, ObjectSpecification) and found.foreign:
+            if found.foreign:
                 found = dataclasses.replace(found, name=_unique(found.name, (one.name for one in out)))
             objects[id(item)] = found
             out.append(found)
-    if wrap is not None and not any(isinstance(one, ObjectSpecification) and one.foreign for one in out):
+    if wrap is not None and not any(one.foreign for one in out):
         raise InvalidInputError("wrap: expected a policy that uses it; a SolverPolicy plays without wrappers.")
     return out
 
@@ -55,9 +55,9 @@ def specifications(given: AnyPolicy | Iterable[AnyPolicy], *, wrap: Wrap | None 
 def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification:
     """One policy, see :func:`specifications`."""
     if isinstance(item, SolverPolicy):
-        return ObjectSpecification(registry.name_of(type(item)), item, {})
+        return Specification(registry.name_of(type(item)), item)
     if _is_object(item):
-        return ObjectSpecification(type(item).__name__, item, {}, wrap)
+        return Specification(type(item).__name__, item, {}, wrap)
     if isinstance(item, type):
         return _of_class(item, {}, wrap)
     if isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], type) and isinstance(item[1], Mapping):
@@ -67,14 +67,14 @@ def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification
         content = registry.load(import_path)
         if isinstance(content, type) and issubclass(content, SolverPolicy):
             return _of_class(registry.resolve(import_path), parameters, wrap)
-        return ObjectSpecification(import_path, import_path, parameters, wrap)
+        return Specification(import_path, import_path, parameters, wrap)
     if not isinstance(item, (str, tuple)):
         raise InvalidInputError(
             "policy: expected a name, 'package.module:Class', a class, or an object with the predict of "
             f"Stable-Baselines3, got {item!r}."
         )
     name, parameters = parse_policy(item)
-    return SolverSpecification(name, registry.get(name), parameters)
+    return Specification(name, registry.get(name), parameters)
 
 
 def bind(
@@ -100,7 +100,7 @@ def check_picklable(all_of: Iterable[Specification]) -> None:
             pickle.dumps(one)
         except Exception as e:  # pickling runs code of the user's
             raise InvalidInputError(f"{one.name} cannot be sent to worker processes ({e}): use one worker.") from e
-        kind = one.kind if isinstance(one, SolverSpecification) else type(getattr(one, "model", one))
+        kind = one.solver or type(one.model)
         if getattr(kind, "__module__", "") == "__main__" and not hasattr(sys.modules["__main__"], "__file__"):
             raise InvalidInputError(
                 f"{one.name} cannot be sent to worker processes, because its class is in no file: use one worker."
@@ -111,18 +111,18 @@ def _of_class(kind: type[Any], parameters: Mapping[str, Any], wrap: Wrap | None)
     if issubclass(kind, SolverPolicy):
         name, kind = registry.name_of(kind), registry.checked_class(kind)
         known_names(f"parameter of {name}", parameters, kind.parameter_names())
-        return SolverSpecification(name, kind, dict(parameters))
+        return Specification(name, kind, dict(parameters))
     if not callable(getattr(kind, "predict", None)):
         raise InvalidInputError(f"policy: expected a class with the predict of Stable-Baselines3, got {kind!r}.")
-    return ObjectSpecification(registry.place_of(kind), kind, dict(parameters), wrap)
+    return Specification(registry.place_of(kind), kind, dict(parameters), wrap)
 
 
 def _registered(name: str) -> Specification:
     """One of all registered policies; one that cannot be imported is no reason to leave the others out."""
     try:
-        return SolverSpecification(name, registry.get(name), {})
+        return Specification(name, registry.get(name))
     except InvalidInputError as e:
-        return SolverSpecification(name, str(e), {})
+        return Specification(name, None, missing=str(e))
 
 
 def _single(given: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Comparisons of policies as records: a record is a line of a table, kept in a CSV file and shown as Markdown.
+"""Comparisons of policies: ranked records, their CSV files and Markdown tables.
 
 Names of columns end with the unit (`time_p50_us`), and an interval is a pair of columns `low` and `high`, possibly with
 a prefix.
@@ -17,20 +17,25 @@ import numpy as np
 from baselines import registry
 from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.summary import Summary, by_seed, summarise
+from baselines.evaluation.summary import Record, by_seed, grouped, labels, record
 from baselines.evaluation.table import NOTHING, code, escaped, grid, number
+from baselines.files import csv_text
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
-from baselines.statistics import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.preview import furthest
 from ikgym.validation import FloatArray
 
-#: One line of a table: the name of each column and its value.
-Record = Mapping[str, Any]
+__all__ = ["BEST_KNOWN", "LOWEST", "Record", "from_csv", "markdown", "records", "to_csv"]
+
 #: Cost ratios where best known costs are missing: relative to the lowest cost in the table.
 LOWEST = "lowest in the table"
 BEST_KNOWN = "best known"
+#: Columns of all records, and of those with free timing or collisions.
+COLUMNS: tuple[str, ...] = (
+    *("policy", "scenario", "foresight", "seeds", "episodes", "relative_to", "cost_ratio", "low", "high", "p90"),
+    *("worst", "lost_percent", "time_p50_us", "time_p99_us"),
+)
+PATH, CONTACTS = ("path_time_s", "path_error_mm"), ("stopped_percent", "clearance_mm")
 #: Suffixes of columns and the units in the heads.
 UNITS = {"us": "µs", "ms": "ms", "s": "s", "mm": "mm", "mrad": "mrad", "rad": "rad", "deg": "°", "percent": "%"}
 #: Columns that are set as code.
@@ -43,32 +48,33 @@ def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str,
     Agents whose files lie in ``DIR/seed-N/`` are training seeds of one agent, which is called DIR. Cost ratios are
     relative to best known costs; if one is missing, to the lowest cost in the table.
 
+    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
+    the largest distance from the reference at the policy's own progress, or on the clock of the others. Where a
+    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
+
     Args:
         rows: Results of an evaluation.
         policies: The policies that were evaluated, as text; each is the label of its line. Others are called by their
             name and the parameters that are not at their defaults.
 
-    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
-    the largest distance from the reference at the policy's own progress, or on the clock of the others. Where a
-    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
-
     Raises:
         InvalidInputError: The training seeds of an agent have played different episodes.
     """
     out: list[dict[str, Any]] = []
-    timing = any(row.path_position_error is not None for row in rows)
-    colliding = any(row.clearance_min is not None for row in rows)
+    columns = COLUMNS
+    columns += PATH * any(row.path_position_error is not None for row in rows)
+    columns += CONTACTS * any(row.clearance_min is not None for row in rows)
     for scenario in dict.fromkeys(row.scenario for row in rows):
         here = [row for row in rows if row.scenario == scenario]
         known = all(row.cost_ratio is not None for row in here)
         lowest = {} if known else _lowest(here)
-        labelled = _by_label(here, policies).items()
-        found = [
-            _record(label, some, lowest)
-            | (_along_path(some) if timing else {})
-            | (_contacts(some) if colliding else {})
-            for label, some in labelled
-        ]
+        found = []
+        for label, some in _by_label(here, policies).items():
+            line = record(label, some, _cost_ratios(label, some, lowest))
+            line |= {"relative_to": BEST_KNOWN if known else LOWEST, "cost_ratio": line["mean"]}
+            if not line["free_timing"]:
+                line["path_error_mm"] = line["position_error_mm"]
+            found.append({name: line[name] for name in columns})
         out += sorted(found, key=lambda one: one["cost_ratio"])
     return out
 
@@ -76,9 +82,10 @@ def records(rows: Sequence[Row], policies: Sequence[str] = ()) -> list[dict[str,
 def _by_label(rows: Sequence[Row], policies: Sequence[str]) -> dict[str, list[Row]]:
     """The rows of one scenario by the label of their policy."""
     given = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
+    groups = list(grouped(rows).values())
     out: dict[str, list[Row]] = {}
-    for summary in summarise(rows):
-        out.setdefault(_label(summary.first, given) or summary.label, []).extend(summary.rows)
+    for group, name in zip(groups, labels([group[0] for group in groups]), strict=True):
+        out.setdefault(_label(group[0], given) or name, []).extend(group)
     return out
 
 
@@ -109,42 +116,6 @@ def _lowest(rows: Iterable[Row]) -> dict[int, float]:
     return out
 
 
-def _record(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> dict[str, Any]:
-    ratios, together = _cost_ratios(label, rows, lowest), Summary(rows)
-    usable = ratios.min() > 0.0 and np.isfinite(ratios).all()
-    low, high = geometric_interval(ratios) if usable else (None, None)
-    return {
-        "policy": label,
-        "scenario": rows[0].scenario,
-        "foresight": max(furthest(row.preview) for row in rows),
-        "seeds": len(ratios),
-        "episodes": ratios.shape[1],
-        "relative_to": LOWEST if lowest else BEST_KNOWN,
-        "cost_ratio": geometric_mean(ratios),
-        "low": low,
-        "high": high,
-        "p90": float(np.percentile(ratios, 90)),
-        "worst": float(ratios.max()),
-        "lost_percent": 100.0 * together.lost / len(rows),
-        "time_p50_us": together.median("time_p50_us"),
-        "time_p99_us": together.largest("time_p99_us"),
-    }
-
-
-def _along_path(rows: Sequence[Row]) -> dict[str, float | None]:
-    errors = [row.position_error_max if row.path_position_error is None else row.path_position_error for row in rows]
-    return {"path_time_s": Summary(rows).path_time, "path_error_mm": 1e3 * max(errors)}
-
-
-def _contacts(rows: Sequence[Row]) -> dict[str, float | None]:
-    together = Summary(rows)
-    stopped, clearance = together.stopped, together.smallest("clearance_min")
-    return {
-        "stopped_percent": None if stopped is None else 100.0 * stopped / len(rows),
-        "clearance_mm": None if clearance is None else 1e3 * clearance,
-    }
-
-
 def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -> FloatArray:
     """One row per training seed, one column per episode. Shape (s, e)."""
     variants: dict[str, list[Row]] = {}
@@ -161,11 +132,7 @@ def _cost_ratios(label: str, rows: Sequence[Row], lowest: Mapping[int, float]) -
 
 def to_csv(lines: Sequence[Record]) -> str:
     """The records as CSV: numbers with six significant digits, None as an empty cell."""
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({name: _plain(value) for name, value in line.items()} for line in lines)
-    return text.getvalue()
+    return csv_text(lines[0], ([_plain(line[name]) for name in lines[0]] for line in lines))
 
 
 def from_csv(text: str) -> list[dict[str, str]]:

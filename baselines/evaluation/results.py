@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import hashlib
 import io
@@ -14,9 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import ikgym
 from baselines.canonical import canonical
-from baselines.evaluation.export import FORMATS, Format, check_log, trajectory_log
+from baselines.evaluation.export import FORMATS, USUAL, Format, trajectory_log
 from baselines.evaluation.jobs import Job, Options, Skipped
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.motion.free_timing import as_long
@@ -24,6 +22,7 @@ from baselines.files import (
     ResultsError,
     check_flags,
     check_writable,
+    csv_text,
     from_json,
     read_arrays,
     read_json,
@@ -143,13 +142,10 @@ class Results:
 
     def save_csv(self) -> None:
         """Writes results.csv: the rows as a table, None as an empty cell, objects and lists as JSON."""
-        text = io.StringIO(newline="")
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for row in self.rows:
-            cells = row.to_json().values()
-            table.writerow([canonical(cell) if isinstance(cell, (dict, list)) else cell for cell in cells])
-        write(self.directory / "results.csv", text.getvalue().encode())
+        lines = [
+            [canonical(v) if isinstance(v, (dict, list)) else v for v in row.to_json().values()] for row in self.rows
+        ]
+        write(self.directory / "results.csv", csv_text(COLUMNS, lines).encode())
 
     def series_file(self, row: Row) -> pathlib.Path:
         """The file with the trajectory log of the first episode of a row's policy in its scenario."""
@@ -169,7 +165,8 @@ class Results:
         file, advice = self.series_file(row), "Delete it and run again with --resume."
         log = read_arrays(file, advice)
         with reading(file, advice):
-            check_log(log)
+            if missing := [name for name in USUAL if name not in log]:
+                raise ValueError(f"the array {missing[0]} is missing")
         return log
 
     def _clear(self) -> None:
@@ -194,24 +191,15 @@ def read_rows(file: pathlib.Path) -> list[Row]:
     with reading(file, advice):
         if not isinstance(content, list):
             raise ValueError(f"expected a list of rows, got {type(content).__name__}")
-        rows = [_row(file, number, values) for number, values in enumerate(content)]
+        rows = []
+        for number, values in enumerate(content):
+            try:
+                rows.append(from_json(Row, Row.nan_restored(values)))
+            except ValueError as e:
+                raise ValueError(f"in row {number} {e}") from None
         if len({row.key for row in rows}) < len(rows):
             raise ValueError("a row is there twice")
     return rows
-
-
-def _row(file: pathlib.Path, number: int, values: Any) -> Row:
-    try:
-        return from_json(Row, Row.nan_restored(values))
-    except ValueError as e:
-        machine = values.get("machine") if isinstance(values, Mapping) else None
-        version = machine.get("ikgym") if isinstance(machine, Mapping) else None
-        if version is None or version == ikgym.__version__:
-            raise ValueError(f"in row {number} {e}") from None
-        raise ResultsError(
-            f"{file} was written by ikgym {version}, this is {ikgym.__version__}: in row {number} {e}. Read it with "
-            "that version, or evaluate again with --overwrite."
-        ) from None
 
 
 def slug(name: str) -> str:
@@ -222,6 +210,7 @@ def slug(name: str) -> str:
 def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], machine: Mapping[str, Any]) -> None:
     """Refuses to mix rows that cannot be compared."""
     by_scenario = {job.scenario.name: job for job in jobs}
+    digests = {name: job.fingerprint for name, job in by_scenario.items()} if rows else {}
     previews = {(job.scenario.name, job.policy, canonical(job.parameters)): furthest(job.preview) for job in jobs}
     for row in rows:
         pairs = [("ikgym", row.machine.get("ikgym"), machine["ikgym"])]
@@ -229,7 +218,7 @@ def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Jo
             preview = previews.get((row.scenario, row.policy, canonical(row.parameters)), row.preview)
             pairs += [
                 (f"{row.scenario} with steps", row.steps, job.scenario.steps),
-                (f"another scenario {row.scenario} with fingerprint", row.fingerprint, job.fingerprint),
+                (f"another scenario {row.scenario} with fingerprint", row.fingerprint, digests[row.scenario]),
                 (f"{row.scenario} in the test set", row.test_set or "none", job.test_set or "none"),
                 (f"{row.policy} in {row.scenario} with preview", row.preview, preview),
             ]

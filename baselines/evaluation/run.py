@@ -56,7 +56,7 @@ def evaluate(
             has drifted or is given with options that it defines.
         ResultsError: `out` cannot be read or written, or its results cannot be continued; the file of an agent cannot
             be used.
-        WorkerError: Workers died repeatedly over one batch, or have other costs than this machine.
+        WorkerError: Workers died repeatedly over one batch, or have another version of the code.
         ClusterError: There is no cluster.
         MissingDependencyError: The package of the cluster is not installed.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import dataclasses
 import inspect
 from collections.abc import Mapping
@@ -20,114 +19,61 @@ from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import offsets
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Specification(abc.ABC):
-    """A policy specification, not yet bound to a scenario."""
-
-    name: str
-
-    @property
-    def identifiable(self) -> bool:
-        """Whether name and parameters identify the policy, so that its results can be continued later."""
-        return True
-
-    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
-        """The parameters of the constructor for one episode."""
-        del scenario, seeds
-        return {}
-
-    def per_episode(self, scenario: Scenario) -> bool:
-        """Whether each episode needs its own policy, as with references that have privileged information."""
-        return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
-
-    @abc.abstractmethod
-    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
-        """The policy for a scenario, with the parameters from :meth:`given`, shown its own preview if None."""
-
-    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
-        """The parameters of the bound policy for rows."""
-        del scenario
-        return {name: jsonable(value) for name, value in getattr(policy, "parameters").items()}  # noqa: B009
-
-    @abc.abstractmethod
-    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
-        """The reason why the policy does not suit a scenario; None if it does."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SolverSpecification(Specification):
-    """A class of policies, or the reason why a registered one cannot be imported, with the user's parameters."""
-
-    kind: type[SolverPolicy] | str
-    chosen: Mapping[str, Any]
-
-    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
-        """The user's parameters, and the seeds that a reference needs to know its episode."""
-        return {**self._seeds(scenario, seeds), **self.chosen}
-
-    def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> SolverPolicy:
-        """See :meth:`Specification.bind`."""
-        del preview
-        if isinstance(self.kind, str):
-            raise InvalidInputError(self.kind)
-        return self.kind.for_scenario(scenario, **given)
-
-    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
-        """All parameters except the seeds of the episode."""
-        assert isinstance(policy, SolverPolicy)
-        hidden = self._seeds(scenario, Seeds(0, policy.parameters.get("arm_seed"))).keys() - self.chosen.keys()
-        return {name: jsonable(value) for name, value in policy.parameters.items() if name not in hidden}
-
-    def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
-        """See :meth:`Specification.unsuited`. Refused parameters are an error of the user's, not a lack of suitability.
-
-        A policy whose package is not installed suits no scenario.
-        """
-        decisive = () if isinstance(self.kind, str) else self.kind.decisive
-        chosen = {key: self.chosen[key] for key in decisive if key in self.chosen}
-        try:
-            self.bind(scenario, {**self._seeds(scenario, seeds), **chosen}, preview)
-        except (InvalidInputError, MissingDependencyError) as e:
-            return str(e)
-        return None
-
-    def _seeds(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
-        """The seeds that a reference takes as parameters."""
-        if isinstance(self.kind, str) or not self.kind.reference:
-            return {}
-        drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": seeds.arm_seed is not None}
-        names = self.kind.parameter_names()
-        return {name: getattr(seeds, name) for name, needed in drawn.items() if needed and name in names}
-
-
 class _RefusedError(InvalidInputError):
     """A class or factory refuses the scenario."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ObjectSpecification(Specification):
-    """A policy that is bound to a scenario, an object with the `predict` of Stable-Baselines3, or a factory of either.
+class Specification:
+    """A policy that is not yet bound to a scenario.
 
-    The model may be an import path ``"package.module:Class"``; a factory is called with the chosen parameters.
+    Args:
+        name: Its name in rows.
+        model: A class of solvers; a solver; an object with the `predict` of Stable-Baselines3; a class or factory of
+            one, which is called with the chosen parameters; or the import path of any but the first.
+        chosen: The user's parameters.
+        wrap: Wraps the environment for a foreign policy.
+        missing: Why a registered policy cannot be imported.
     """
 
+    name: str
     model: Any
-    chosen: Mapping[str, Any]
+    chosen: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     wrap: Wrap | None = None
+    missing: str = ""
 
     @property
-    def identifiable(self) -> bool:
-        """Whether it is a class, an import path or a solver; two objects of one class may differ."""
-        return isinstance(self.model, (str, type, SolverPolicy))
+    def solver(self) -> type[SolverPolicy] | None:
+        """The class of solvers, if it is one."""
+        return self.model if isinstance(self.model, type) and issubclass(self.model, SolverPolicy) else None
 
     @property
     def foreign(self) -> bool:
-        """Whether it may be a policy of others, which plays in wrappers."""
-        return not isinstance(self.model, SolverPolicy)
+        """Whether it may be a foreign policy, which plays in wrappers."""
+        return not (self.solver or self.missing or isinstance(self.model, SolverPolicy))
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether name and parameters identify the policy, so that its results can be continued later.
+
+        Two objects of one class may differ.
+        """
+        return bool(self.missing) or isinstance(self.model, (str, type, SolverPolicy))
+
+    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+        """The parameters of a solver for one episode: the user's, and the seeds that a reference needs to know it."""
+        return {**self._seeds(scenario, seeds), **self.chosen} if self.solver else {}
+
+    def per_episode(self, scenario: Scenario) -> bool:
+        """Whether each episode needs its own policy, as with references that have privileged information."""
+        return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
 
     def bind(self, scenario: Scenario, given: Mapping[str, Any], preview: Preview | None) -> Policy:
-        """See :meth:`Specification.bind`."""
-        del given
+        """The policy for a scenario, with the parameters from :meth:`given`, shown its own preview if None."""
+        if self.missing:
+            raise InvalidInputError(self.missing)
+        if self.solver is not None:
+            return self.solver.for_scenario(scenario, **given)
         model = registry.load(self.model) if isinstance(self.model, str) else self.model
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
             model = self._call(model, scenario)
@@ -142,14 +88,40 @@ class ObjectSpecification(Specification):
         ahead = self._preview(model, preview)
         return ForeignPolicy(self.name, cast(Predictor, model), ahead, self.wrap, jsonable(own))
 
+    def parameters(self, scenario: Scenario, policy: Policy) -> dict[str, Any]:
+        """The parameters of the bound policy for rows: all except the seeds of the episode."""
+        values: Mapping[str, Any] = getattr(policy, "parameters")  # noqa: B009
+        hidden = self._seeds(scenario, Seeds(0, values.get("arm_seed"))).keys() - self.chosen.keys()
+        return {name: jsonable(value) for name, value in values.items() if name not in hidden}
+
     def unsuited(self, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> str | None:
-        """See :meth:`Specification.unsuited`."""
-        del seeds
+        """The reason why the policy does not suit a scenario; None if it does.
+
+        Refused parameters are an error of the user's, not a lack of suitability. A policy whose package is not
+        installed suits no scenario.
+        """
+        if self.missing:
+            return self.missing
+        if self.solver is not None:
+            decisive = {name: self.chosen[name] for name in self.solver.decisive if name in self.chosen}
+            try:
+                self.bind(scenario, {**self._seeds(scenario, seeds), **decisive}, preview)
+            except (InvalidInputError, MissingDependencyError) as e:
+                return str(e)
+            return None
         try:
             policy = self.bind(scenario, {}, preview)
         except _RefusedError as e:
             return str(e)
         return policy.misfit(scenario) if isinstance(policy, ForeignPolicy) else None
+
+    def _seeds(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+        """The seeds that a reference takes as parameters."""
+        if self.solver is None or not self.solver.reference:
+            return {}
+        drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": seeds.arm_seed is not None}
+        names = self.solver.parameter_names()
+        return {name: getattr(seeds, name) for name, needed in drawn.items() if needed and name in names}
 
     def _call(self, factory: Any, scenario: Scenario) -> Any:
         """The object that a class or factory makes; the scenario is passed if an argument is required."""

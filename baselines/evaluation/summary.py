@@ -1,145 +1,163 @@
-"""The episodes of a policy in a scenario put together: costs, comparisons with the ideal plant, labels."""
+"""The episodes of a policy in a scenario as one record, which is a line of all tables of results."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
-import functools
-import math
-import operator
 import statistics
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from baselines import registry
 from baselines.canonical import canonical
 from baselines.evaluation.metrics import Row
-from baselines.statistics import Spread, geometric_interval, geometric_mean
+from baselines.statistics import geometric_interval, geometric_mean
 from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.scenarios.preview import furthest
+from ikgym.validation import FloatArray
+
+#: One line of a table: the name of each column and its value. Names end with the unit, such as `time_p50_us`.
+Record = Mapping[str, Any]
+#: What the episodes of a scenario are compared by.
+RATIO, TOTAL = "cost ratio", "total cost"
 
 
-class Paired(NamedTuple):
-    """A policy compared with itself on an ideal plant, on the same reset seeds."""
+def grouped(rows: Iterable[Row]) -> dict[tuple[str, str, str, int], list[Row]]:
+    """The rows of each policy with its parameters in each scenario, in the order of their first rows.
 
-    cost_ratio: float | None  # geometric mean of the cost ratio on the ideal plant; None where it is not known
-    mean: float  # geometric mean of the cost divided by that of the same seed on the ideal plant
-    low: float  # lower end of its 95 % interval over the seeds
-    high: float  # upper end
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Summary:
-    """The episodes of one policy in one scenario. Episodes that differ in their noise alone count as one.
-
-    `ideal` has the rows of the same policy with an ideal plant; it is empty if the plant is ideal itself.
+    Raises:
+        InvalidInputError: Two scenarios share a name, or rows belong to different test sets.
     """
-
-    rows: Sequence[Row]
-    ideal: Sequence[Row] = ()
-    label: str = ""
-
-    @property
-    def first(self) -> Row:
-        """The row of the first episode."""
-        return self.rows[0]
-
-    @functools.cached_property
-    def total_cost(self) -> Spread:
-        """The total cost."""
-        return Spread.of(by_seed(self.rows, _total))
-
-    @functools.cached_property
-    def cost_ratio(self) -> Spread | None:
-        """The cost ratio; None if that of an episode is not known."""
-        if any(row.cost_ratio is None for row in self.rows):
-            return None
-        return Spread.of(by_seed(self.rows, _ratio))
-
-    @functools.cached_property
-    def interval(self) -> tuple[float, float] | None:
-        """The 95 % interval of the cost ratio, or of the total cost if the ratio is not known; None if it has none."""
-        values = list(by_seed(self.rows, _ratio if self.cost_ratio else _total).values())
-        usable = len(values) > 1 and all(0.0 < value < math.inf for value in values)
-        return geometric_interval(values) if usable else None
-
-    @functools.cached_property
-    def paired(self) -> Paired | None:
-        """The comparison with an ideal plant; None without common seeds, or if a cost is 0."""
-        costs, plain = by_seed(self.rows, _total), by_seed(self.ideal, _total)
-        common = [seed for seed in costs if seed in plain]
-        if not common or min(min(plain[seed], costs[seed]) for seed in common) <= 0.0:
-            return None
-        ratios = [costs[seed] / plain[seed] for seed in common]
-        known = [row.cost_ratio for row in self.ideal if row.seed in costs and row.cost_ratio is not None]
-        mean = geometric_mean(known) if len(known) == len(common) else None
-        return Paired(mean, geometric_mean(ratios), *geometric_interval(ratios))
-
-    @functools.cached_property
-    def episodes(self) -> int:
-        """Number of episodes."""
-        return len({row.seed for row in self.rows})
-
-    @property
-    def lost(self) -> int:
-        """Number of rows in which the arm was lost."""
-        return sum(row.lost for row in self.rows)
-
-    @property
-    def followed(self) -> int:
-        """Number of rows in which the path was followed."""
-        return sum(row.followed for row in self.rows)
-
-    @property
-    def stopped(self) -> int | None:
-        """Number of rows in which the arm was stopped; None without collisions."""
-        return None if self.first.clearance_min is None else sum(row.stopped is not None for row in self.rows)
-
-    @property
-    def solver_status(self) -> str:
-        """The worst status that the solver reported."""
-        return max((row.solver_status for row in self.rows), key=lambda status: Status[status.upper()])
-
-    @property
-    def free_timing(self) -> bool:
-        """Whether the policy may be later than the reference."""
-        return self.first.path_position_error is not None
-
-    @property
-    def path_time(self) -> float | None:
-        """The longest time to the end of the path, in [s]; None if an episode did not reach it."""
-        return None if any(row.path_time is None for row in self.rows) else self.largest("path_time")
-
-    @property
-    def reference(self) -> bool:
-        """Whether the policy has privileged information."""
-        return is_reference(self.first.policy)
-
-    def _values(self, column: str) -> list[Any]:
-        return [value for row in self.rows if (value := getattr(row, column)) is not None]
-
-    def mean(self, column: str) -> float:
-        """The geometric mean of a column."""
-        return geometric_mean(self._values(column))
-
-    def median(self, column: str) -> float | None:
-        """The median of a column; None if no episode has a value."""
-        return statistics.median(values) if (values := self._values(column)) else None
-
-    def largest(self, column: str) -> float | None:
-        """The maximum of a column; None if no episode has a value."""
-        return max(self._values(column), default=None)
-
-    def smallest(self, column: str) -> float | None:
-        """The minimum of a column; None if no episode has a value."""
-        return min(self._values(column), default=None)
-
-    def total(self, column: str) -> int | None:
-        """The sum of a column; None if no episode has a value."""
-        return sum(values) if (values := self._values(column)) else None
+    groups: dict[tuple[str, str, str, int], list[Row]] = {}
+    contents: dict[str, tuple[str, str | None]] = {}
+    for row in rows:
+        content = row.fingerprint, row.test_set
+        if contents.setdefault(row.scenario, content) != content:
+            raise InvalidInputError(
+                f"The results of {row.scenario!r} cannot be put together: fingerprint and test set are "
+                f"{contents[row.scenario]} and {content}."
+            )
+        groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
+    return groups
 
 
-_total: Callable[[Row], float] = operator.attrgetter("total_cost")
+def summarise(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """One record for each group of rows, see :func:`grouped` and :func:`record`.
+
+    Besides: `quantity`, what the episodes are compared by, which is the cost ratio if all of the scenario are known;
+    `cost_ratio` of the policy, None if it is not known; `ideal_cost_ratio`, its cost ratio on an ideal plant; and
+    `times_ideal`, the geometric mean of its cost divided by that of the same seed there, with its interval.
+    """
+    groups = grouped(rows)
+    unknown = {row.scenario for group in groups.values() for row in group if row.cost_ratio is None}
+    ideal = {
+        (group[0].fingerprint, *key[1:]): group
+        for key, group in groups.items()
+        if group[0].fingerprint == group[0].ideal
+    }
+    out = []
+    for (key, group), label in zip(groups.items(), labels([group[0] for group in groups.values()]), strict=True):
+        first, values = group[0], by_seed(group, _total if key[0] in unknown else _ratio)
+        known = all(row.cost_ratio is not None for row in group)
+        plain = [] if first.fingerprint == first.ideal else ideal.get((str(first.ideal), *key[1:]), [])
+        out.append(
+            record(label, group, np.array([list(values.values())]))
+            | {"quantity": TOTAL if key[0] in unknown else RATIO}
+            | {"cost_ratio": geometric_mean([*map(_ratio, group)]) if known else None}
+            | _beside_ideal(group, plain)
+        )
+    return out
+
+
+def record(label: str, rows: Sequence[Row], values: FloatArray) -> dict[str, Any]:
+    """The record of a policy in a scenario.
+
+    Args:
+        label: What the policy is called.
+        rows: Its rows.
+        values: The cost ratio or the total cost of each episode, one row per training seed. Shape (s, e).
+
+    Returns:
+        Spread of the values: geometric `mean` with its interval `low` to `high`, None if it has none, `median`, `p90`,
+        `worst` and `worst_seed`; means of costs, largest errors, sums of steps and misses; `first`, the first row.
+    """
+    first, seeds = rows[0], list(dict.fromkeys(row.seed for row in rows))
+    usable = values.min() > 0.0 and np.isfinite(values).all()
+    low, high = geometric_interval(values) if usable else (None, None)
+
+    def of(column: str) -> list[Any]:
+        return [value for row in rows if (value := getattr(row, column)) is not None]
+
+    def largest(column: str, scale: float = 1.0) -> float | None:
+        return max((scale * value for value in of(column)), default=None)
+
+    times, lost = of("time_p50_us"), sum(row.lost for row in rows)
+    colliding, free = first.clearance_min is not None, first.path_position_error is not None
+    return {
+        "policy": label,
+        "scenario": first.scenario,
+        "first": first,
+        "reference": is_reference(first.policy),
+        "steps": first.steps,
+        "foresight": max(furthest(row.preview) for row in rows),
+        "seeds": len(values),
+        "episodes": values.shape[1],
+        "rows": len(rows),
+        "total_cost": geometric_mean(of("total_cost")),
+        "tracking_cost": geometric_mean(of("tracking_cost")),
+        "mean": geometric_mean(values),
+        "low": low,
+        "high": high,
+        "median": statistics.median(np.ravel(values).tolist()),
+        "p90": float(np.percentile(values, 90)),
+        "worst": float(values.max()),
+        "worst_seed": seeds[int(values.max(axis=0).argmax())],
+        "lost": lost,
+        "lost_percent": 100.0 * lost / len(rows),
+        "followed": sum(row.followed for row in rows),
+        "solver_status": max(of("solver_status"), key=lambda status: Status[status.upper()]),
+        "position_error_mm": largest("position_error_max", 1e3),
+        "orientation_error_mrad": largest("orientation_error_max", 1e3),
+        "qdot_peak": largest("qdot_peak"),
+        "qddot_peak": largest("qddot_peak"),
+        **{
+            f"steps_at_{kind}_limit": sum(of(f"steps_at_{kind}_limit"))
+            for kind in ("joint", "velocity", "acceleration")
+        },
+        "time_p50_us": statistics.median(times) if times else None,
+        "time_p99_us": largest("time_p99_us"),
+        "deadline_misses": sum(of("deadline_misses")) if times else None,
+        "free_timing": free,
+        "path_time_s": largest("path_time") if len(of("path_time")) == len(rows) else None,
+        "path_error_mm": largest("path_position_error", 1e3) if free else None,
+        "stopped": len(of("stopped")) if colliding else None,
+        "stopped_percent": 100.0 * len(of("stopped")) / len(rows) if colliding else None,
+        "clearance_mm": 1e3 * min(of("clearance_min")) if colliding else None,
+    }
+
+
+def _beside_ideal(rows: Sequence[Row], plain: Sequence[Row]) -> dict[str, float | None]:
+    """The comparison with the rows of the same policy on an ideal plant."""
+    costs, there = by_seed(rows, _total), by_seed(plain, _total)
+    common = [seed for seed in costs if seed in there]
+    if not common or min(min(there[seed], costs[seed]) for seed in common) <= 0.0:
+        return dict.fromkeys(("ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"))
+    factors = [costs[seed] / there[seed] for seed in common]
+    known = [row.cost_ratio for row in plain if row.seed in costs and row.cost_ratio is not None]
+    low, high = geometric_interval(factors)
+    return {
+        "ideal_cost_ratio": geometric_mean(known) if len(known) == len(common) else None,
+        "times_ideal": geometric_mean(factors),
+        "times_ideal_low": low,
+        "times_ideal_high": high,
+    }
+
+
+def _total(row: Row) -> float:
+    return row.total_cost
 
 
 def _ratio(row: Row) -> float:
@@ -154,42 +172,11 @@ def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, flo
     return {seed: geometric_mean(values) for seed, values in found.items()}
 
 
-def summarise(rows: Iterable[Row]) -> list[Summary]:
-    """One summary for each policy with its parameters in each scenario, in the order of their first rows.
-
-    Refused where two scenarios share a name, or rows belong to different test sets.
-    """
-    groups: dict[tuple[str, str, str, int], list[Row]] = {}
-    contents: dict[str, tuple[str, str | None]] = {}
-    for row in rows:
-        content = row.fingerprint, row.test_set
-        if contents.setdefault(row.scenario, content) != content:
-            raise InvalidInputError(
-                f"The results of {row.scenario!r} cannot be put together: fingerprint and test set are "
-                f"{contents[row.scenario]} and {content}."
-            )
-        groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
-    ideal = {
-        (group[0].fingerprint, *key[1:]): group
-        for key, group in groups.items()
-        if group[0].fingerprint == group[0].ideal
-    }
-    names = _labels([group[0] for group in groups.values()])
-    return [
-        Summary(
-            group,
-            () if group[0].fingerprint == group[0].ideal else ideal.get((str(group[0].ideal), *key[1:]), ()),
-            name,
-        )
-        for (key, group), name in zip(groups.items(), names, strict=True)
-    ]
-
-
-def by_scenario(rows: Iterable[Row]) -> dict[str, list[Summary]]:
-    """Summaries of each scenario, in the order of the rows."""
-    out: dict[str, list[Summary]] = {}
-    for summary in summarise(rows):
-        out.setdefault(summary.first.scenario, []).append(summary)
+def by_scenario(rows: Iterable[Row]) -> dict[str, list[dict[str, Any]]]:
+    """The records of each scenario, in the order of the rows."""
+    out: dict[str, list[dict[str, Any]]] = {}
+    for one in summarise(rows):
+        out.setdefault(one["scenario"], []).append(one)
     return out
 
 
@@ -202,7 +189,7 @@ def is_reference(policy: str) -> bool:
     return bool(getattr(kind, "reference", False))
 
 
-def _labels(rows: Sequence[Row]) -> list[str]:
+def labels(rows: Sequence[Row]) -> list[str]:
     """A label for the policy of each row.
 
     The name, and the parameters that are not at their defaults; if that leaves two policies of a scenario alike, all

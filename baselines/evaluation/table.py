@@ -1,4 +1,4 @@
-"""Tables of summaries as plain text, Markdown and HTML."""
+"""Tables of records as plain text and HTML, and numbers and names as text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
 
-from baselines.evaluation.summary import Summary
+from baselines.evaluation.summary import Record
 
 #: The text of a cell without a value, and its value for sorting.
 NOTHING, LAST = "–", 1e300
@@ -16,71 +16,70 @@ NOTHING, LAST = "–", 1e300
 LONGEST = 20
 
 
-def number(value: float | None, scale: float = 1.0) -> str:
+def number(value: float | None) -> str:
     """A number with four significant digits: ``1234``, ``0.01235``, ``1.235e7``; a dash for none."""
     if value is None or math.isnan(value):
         return NOTHING
     if value == 0.0:
         return "0"
-    digits = f"{value * scale:#.4g}"
+    digits = f"{value:#.4g}"
     mantissa, _, exponent = digits.partition("e")
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """A column of a table of summaries."""
+    """A column of a table of records."""
 
     title: str  # its head
-    unit: str  # the second line of the head; empty for pure numbers
-    value: Callable[[Summary], float | str | None]  # the value of a cell: a float, an integer, a text, or None
-    scale: float = 1.0  # factor of floats
-    text: Callable[[Summary], str] | None = None  # the text of a cell, if it is not that of its value
+    unit: str  # the second line of the head
+    name: str  # what records call its value: a float, an integer, a text, or None
     about: str = ""  # a description, shown in HTML when the pointer is on the head
     drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
+    text: Callable[[Record], str] | None = None  # the text of a cell, if it is not that of its value
 
     @property
     def head(self) -> str:
         """The head in one line."""
         return f"{self.title} {self.unit}".strip()
 
-    def cell(self, summary: Summary) -> str:
+    def cell(self, line: Record) -> str:
         """The text of a cell."""
         if self.text is not None:
-            return self.text(summary)
-        value = self.value(summary)
-        return str(value) if isinstance(value, (int, str)) else number(value, self.scale)
+            return self.text(line)
+        value = line[self.name]
+        return str(value) if isinstance(value, (int, str)) else number(value)
 
-    def left(self, summary: Summary) -> bool:
+    def left(self, line: Record) -> bool:
         """Whether cells are aligned to the left, as text is."""
-        return isinstance(self.value(summary), str)
+        return isinstance(line[self.name], str)
 
 
-def fitting(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> list[Column]:
+def fitting(columns: Sequence[Column], lines: Sequence[Record], width: int) -> list[Column]:
     """The columns that fit a line."""
-    kept = filled(columns, summaries)
+    kept = filled(columns, lines)
     for column in sorted(kept, key=lambda column: -column.drop):
-        rule = next(line for line in plain(kept, summaries, 0).splitlines() if set(line) == {"-"})
+        rule = next(line for line in plain(kept, lines, 0).splitlines() if set(line) == {"-"})
         if not column.drop or len(rule) <= width:
             break
         kept.remove(column)
     return kept
 
 
-def filled(columns: Iterable[Column], summaries: Sequence[Summary]) -> list[Column]:
+def filled(columns: Iterable[Column], lines: Sequence[Record]) -> list[Column]:
     """The columns that have a value in some line."""
-    return [column for column in columns if any(column.cell(one) != NOTHING for one in summaries)]
+    return [column for column in columns if any(column.cell(one) != NOTHING for one in lines)]
 
 
-def plain(columns: Sequence[Column], summaries: Sequence[Summary], width: int) -> str:
+def plain(columns: Sequence[Column], lines: Sequence[Record], width: int) -> str:
     """A table as plain text: policies first, columns closer together if they would not fit, empty ones left out."""
-    columns = filled(columns, summaries)
+    columns = filled(columns, lines)
     heads = [[column.title for column in columns], [column.unit for column in columns]]
-    heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in summaries]
+    heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in lines]
     sizes = [max(_width(line[i]) for line in [*heads, *body]) for i in range(len(columns))]
     sizes[0] = max(size for line in [*heads, *body] if (size := _width(line[0])) <= LONGEST)
     gap = "  " if sum(sizes) + 2 * (len(columns) - 1) <= width else " "
-    left = [column.left(summaries[0]) for column in columns]
+    left = [column.left(lines[0]) for column in columns]
 
     def padded(line: Sequence[str]) -> str:
         blanks = [" " * (size - _width(text)) for text, size in zip(line, sizes, strict=True)]
@@ -101,33 +100,23 @@ def _width(text: str) -> int:
     return len(text) - text.count("\u0307")
 
 
-def markdown(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
-    """A table as Markdown."""
-    columns = filled(columns, summaries)
-    text = [i for i, column in enumerate(columns) if column.left(summaries[0])]
-    cells = [[escaped(column.cell(one)) for column in columns] for one in summaries]
-    return grid([column.head for column in columns], cells, text=text)
-
-
-def html(columns: Sequence[Column], summaries: Sequence[Summary]) -> str:
-    """A table as HTML, complete without scripts; the value of a line's checkbox is the number of its summary."""
-    columns = filled(columns, summaries)
+def html(columns: Sequence[Column], lines: Sequence[Record]) -> str:
+    """A table as HTML, complete without scripts; the value of a line's checkbox is its number."""
+    columns = filled(columns, lines)
     heads = [("policy", "* has privileged information, ‡ free timing"), ("scenario", "name of the scenario")]
     heads += [(column.head, column.about) for column in columns]
     out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']
     out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
     out.append("</tr></thead><tbody>")
-    for place, summary in enumerate(summaries):
-        name, scenario = (
-            escape(summary.label + " *" * summary.reference + " ‡" * summary.free_timing),
-            escape(summary.first.scenario),
-        )
+    for place, line in enumerate(lines):
+        name = escape(line["policy"] + " *" * line["reference"] + " ‡" * line["free_timing"])
+        scenario = escape(line["scenario"])
         out += [
             f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
             f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'
         ]
         for column in columns:
-            value, text = column.value(summary), escape(column.cell(summary))
+            value, text = line[column.name], escape(column.cell(line))
             order = value if isinstance(value, (int, float)) and math.isfinite(value) else LAST
             out.append(
                 f"<td>{text}</td>" if isinstance(value, str) else f'<td class="number" data-order="{order}">{text}</td>'

@@ -47,7 +47,6 @@ class Tracking:
         tracking_cost: Φ^X, 0 where the step does not count. Shape (steps,).
         velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
         statuses: Values of :class:`baselines.Status`. Shape (steps,).
-        prismatic: Which joints are prismatic. Shape (n,).
     """
 
     scenario: str
@@ -64,7 +63,6 @@ class Tracking:
     tracking_cost: FloatArray
     velocity_cost: FloatArray
     statuses: npt.NDArray[np.int64]
-    prismatic: npt.NDArray[np.bool_]
     _played: tuple[Scenario, Seeds, Episode] = dataclasses.field(repr=False)
 
     @property
@@ -166,21 +164,10 @@ def track(
     with threadpool_limits(limits=1):
         (episode,) = play_episodes(found, bound, [seeds], shown, timed=True)
     found = as_long(found, episode)
-    return _tracking(found, one.name, one.parameters(found, bound), seeds, episode)
-
-
-def _tracking(scenario: Scenario, policy: str, parameters: dict[str, Any], seeds: Seeds, episode: Episode) -> Tracking:
-    arrays = {
-        "times": scenario.dt * np.arange(1, scenario.steps + 1),
-        "nominal": scenario.nominal(seeds.seed)[1:],
-        "statuses": episode.status,
-        "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
-        **{
-            name: getattr(episode, name)
-            for name in (
-                "q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost",
-            )
-        },
-    }  # fmt: skip
+    names = ("q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost")
+    arrays: dict[str, Any] = {name: getattr(episode, name) for name in names}
+    arrays["times"] = found.dt * np.arange(1, found.steps + 1)
+    arrays["nominal"] = found.nominal(seed)[1:]
+    arrays["statuses"] = episode.status
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    return Tracking(scenario.name, policy, parameters, seeds.seed, **kept, _played=(scenario, seeds, episode))
+    return Tracking(found.name, one.name, one.parameters(found, bound), seed, **kept, _played=(found, seeds, episode))

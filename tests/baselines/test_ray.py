@@ -34,8 +34,6 @@ EPISODES = 12
 FOLDER, NODE, AT_WORK = "IKGYM_TEST_FOLDER", "IKGYM_TEST_NODE", "at-work"
 #: In [s]: far more than it takes.
 PATIENCE = 100
-#: Before a test replaces it.
-PLAIN_WORK = playing.work
 
 
 @pytest.fixture
@@ -91,7 +89,7 @@ def work(unit):
         time.sleep(2 * PATIENCE)
     if node == "head" and number == EPISODES // 2:
         wait_for((folder / AT_WORK).exists, PATIENCE)
-    return PLAIN_WORK(unit)
+    return playing.play(unit)
 
 
 class Unknown:
@@ -105,27 +103,27 @@ class Unknown:
 @needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
     nodes, other, folder = cluster
-    check, done = playing._ClusterCheck.check, []
+    check, done = playing.check_versions, []
 
-    def kill_half_way(self, batch, *results):
+    def kill_half_way(batch, results):
         done.append(batch[0].key)
         if len(done) == EPISODES // 2:
             assert wait_for((folder / AT_WORK).exists, PATIENCE)
             nodes.remove_node(other, allow_graceful=False)
-        check(self, batch, *results)
+        check(batch, results)
 
     given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50}
     alone = evaluate(**given)
-    for name, instead in {"BLOCK": 1, "work": work}.items():
-        monkeypatch.setattr(playing, name, instead)
-    monkeypatch.setattr(playing._ClusterCheck, "check", kill_half_way)
+    monkeypatch.setattr(playing, "BLOCK", 1)
+    monkeypatch.setattr(playing, "finished", lambda function, *given: finished(work, *given))
+    monkeypatch.setattr(playing, "check_versions", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
     assert caplog.text.count("its job is retried") == 1
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
     # To start nodes takes long: so here is also seen what they say of units that they cannot read.
-    ((_, future),) = finished(playing.work, [Unknown()], Workers(cluster="ray"))
+    ((_, future),) = finished(work, [Unknown()], Workers(cluster="ray"))
     with pytest.raises(ClusterError, match=r"cannot do its work: .*no_such_module.* Install ikgym and the packages"):
         future.result()
 

@@ -10,10 +10,9 @@ import time
 
 import pytest
 
-from baselines.workers import WorkerError, Workers, finished
+from baselines.workers import Workers, finished
 from ikgym import parallel
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
-from tests.baselines.losing import LosingCluster
 
 FAR = Workers(cluster="ray")
 EVALUATE = ("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--policies", "rhc:horizon=100,starts=1")
@@ -42,12 +41,6 @@ def wait_for(condition, seconds):
     return condition()
 
 
-def square(unit):
-    if unit < 0:
-        raise InvalidInputError(f"expected at least 0, got {unit}")
-    return unit * unit
-
-
 def dies_once(unit):
     """Is killed at the unit 1 unless a file exists that it makes before."""
     folder, number = unit
@@ -71,21 +64,6 @@ def waits(folder):
 def results(*arguments, **options):
     with contextlib.closing(finished(*arguments, **options)) as done:
         return {unit: future.result() for unit, future in done}
-
-
-def test_a_dead_worker_costs_a_retry(monkeypatch, caplog):
-    cluster = LosingCluster(monkeypatch, lost=[1, 4])
-    assert results(square, range(4), FAR) == {0: 0, 1: 1, 2: 4, 3: 9}
-    assert cluster.units == [0, 1, 1, 2, 3, 3]
-    assert caplog.text.count("its job is retried") == 2
-
-
-def test_a_unit_that_kills_all_workers_is_an_error_and_the_others_are_done(monkeypatch):
-    LosingCluster(monkeypatch, lost=[1, 2, 3])
-    futures = dict(finished(square, range(3), FAR))
-    with pytest.raises(WorkerError, match="workers died over it 3 times, the last time because its node was lost"):
-        futures.pop(1).result()
-    assert {unit: future.result() for unit, future in futures.items()} == {0: 0, 2: 4}
 
 
 @needs_proc

@@ -38,9 +38,11 @@ class Comparison:
 
     def table(self, width: int = report.WIDTH) -> str:
         """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""
-        follows = Column("follows", "", lambda one: "no" if fault(one.first, self.dt) else "yes")
-        lines = summarise(self.rows)
-        columns = fitting((*COLUMNS, follows), lines, width)
+        lines = [
+            {**line, "solver": solver_of(line["first"]), "follows": "no" if fault(line["first"], self.dt) else "yes"}
+            for line in summarise(self.rows)
+        ]
+        columns = fitting(COLUMNS, lines, width)
         texts = [
             f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller"
         ]
@@ -55,12 +57,13 @@ def solver_of(row: Row) -> str:
 
 
 COLUMNS = (
-    Column("solver", "", lambda one: solver_of(one.first)),
-    Column("path", "", lambda one: one.first.scenario),
+    Column("solver", "", "solver"),
+    Column("path", "", "scenario"),
     *report.ERRORS[:3],
     dataclasses.replace(report.ERRORS[3], drop=0),  # decides
-    Column("at stop", "[steps]", lambda one: one.total("steps_at_joint_limit")),
+    Column("at stop", "[steps]", "steps_at_joint_limit"),
     *report.TIMES[:2],
+    Column("follows", "", "follows"),
 )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import functools
 import importlib.resources
 import json
 import math
@@ -16,8 +15,8 @@ from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.results import Results
-from baselines.evaluation.summary import Summary, by_scenario
-from baselines.evaluation.table import NOTHING, Column, html
+from baselines.evaluation.summary import Record, by_scenario
+from baselines.evaluation.table import NOTHING, Column, html, number
 
 #: A placeholder in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
@@ -26,30 +25,19 @@ PLACE = re.compile(r"\[\[(\w+)\]\]")
 COLUMNS = (
     report.RATIO,
     Column(
-        "95 %",
-        "",
-        lambda s: s.interval[0] if s.cost_ratio and s.interval else None,
-        text=lambda s: report.interval_text(s.interval if s.cost_ratio else None),
-        about="interval of the mean cost ratio over the episodes",
+        *("95 %", "", "low", "interval of the mean cost ratio over the episodes"),
+        text=lambda line: report.interval(line) if line["cost_ratio"] and line["episodes"] > 1 else NOTHING,
     ),
-    Column("worst", "", lambda s: s.cost_ratio and s.cost_ratio.worst, about="largest cost ratio of an episode"),
+    Column(
+        *("worst", "", "worst", "largest cost ratio of an episode"),
+        text=lambda line: number(line["worst"] if line["cost_ratio"] else None),
+    ),
     report.TOTAL,
     *report.ERRORS,
-    *(
-        Column(f"at {limit}", "", functools.partial(Summary.total, column=f"steps_at_{kind}_limit"), about=about)
-        for limit, kind, about in (
-            ("stop", "joint", "steps with a joint at a stop"),
-            ("q̇ limit", "velocity", "steps with a joint at its velocity limit"),
-            ("q̈ limit", "acceleration", "steps with a joint at its acceleration limit"),
-        )
-    ),
-    *report.PATH,
-    *report.CONTACTS,
-    *report.TIMES,
-    report.EPISODES,
-    report.LOST,
-    report.FOLLOWED,
-    report.STATUS,
+    Column("at stop", "", "steps_at_joint_limit", "steps with a joint at a stop"),
+    Column("at q̇ limit", "", "steps_at_velocity_limit", "steps with a joint at its velocity limit"),
+    Column("at q̈ limit", "", "steps_at_acceleration_limit", "steps with a joint at its acceleration limit"),
+    *(*report.PATH, *report.CONTACTS, *report.TIMES, report.EPISODES, report.LOST, report.FOLLOWED, report.STATUS),
 )
 
 
@@ -58,20 +46,18 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     from plotly.offline import get_plotlyjs  # slow to import, and not needed for rows
 
     rows = results.rows
-    shown = [summary for some in by_scenario(rows).values() for summary in some]
-    scenarios = list(dict.fromkeys(one.first.scenario for one in shown))
-    numbers = {"scenarios": len(scenarios), "policies": len({one.label for one in shown}), "episodes": len(rows)}
+    shown = [line for lines in by_scenario(rows).values() for line in lines]
+    scenarios = list(dict.fromkeys(line["scenario"] for line in shown))
+    numbers = {"scenarios": len(scenarios), "policies": len({one["policy"] for one in shown}), "episodes": len(rows)}
     parts = {
         "style": _file("page.css"),
         "title": escape(", ".join(scenarios[:2]) + " …" * (len(scenarios) > 2)),
         "scenarios": escape(", ".join(scenarios)),
         "subtitle": f"{', '.join(f'{name}: {n}' for name, n in numbers.items())}; {date:%Y-%m-%d %H:%M} UTC",
         "table": html(COLUMNS, shown),
-        "notes": _items(
-            [*report.remarks(rows), *(f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped)]
-        ),
+        "notes": _items(report.remarks(rows, skipped)),
         "conditions": _items([f"command: {command}", *report.machines(rows)]),
-        "parameters": _items(f"{one.label} in {one.first.scenario}: {_parameters(one)}" for one in shown),
+        "parameters": _items(report.parameters(shown)),
         "data": embedded(data(results, shown)),
         "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
@@ -80,23 +66,18 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     return PLACE.sub(lambda found: parts[found[1]], _file("template.html")).encode()
 
 
-def data(results: Results, summaries: Sequence[Summary]) -> list[dict[str, Any]]:
+def data(results: Results, lines: Sequence[Record]) -> list[dict[str, Any]]:
     """The data of the plots: costs, times and the thinned trajectory log of each line of the table."""
-    logged = [one for one in summaries if results.series_file(one.first).exists()]
+    logged = [line for line in lines if results.series_file(line["first"]).exists()]
     return [
         {
-            "scenario": one.first.scenario,
-            "policy": one.label,
-            "reference": one.reference,
-            "quantity": "cost ratio" if one.cost_ratio else "total cost",
-            "value": _finite((one.cost_ratio or one.total_cost).mean),
-            "low": one.interval and _finite(one.interval[0]),
-            "high": one.interval and _finite(one.interval[1]),
-            "time": one.median("time_p50_us"),
-            "seed": one.first.seed,
-            "series": thinned(results.series(one.first), BUDGET // len(logged)) if one in logged else None,
+            **{name: line[name] for name in ("scenario", "policy", "reference", "quantity", "low", "high")},
+            "value": line["mean"] if math.isfinite(line["mean"]) else None,
+            "time": line["time_p50_us"],
+            "seed": line["first"].seed,
+            "series": thinned(results.series(line["first"]), BUDGET // len(logged)) if line in logged else None,
         }
-        for one in summaries
+        for line in lines
     ]
 
 
@@ -106,17 +87,9 @@ def embedded(content: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _file(name: str) -> str:
     return importlib.resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _items(texts: Iterable[str]) -> str:
     return "".join(f"<li>{escape(text)}</li>" for text in texts)
-
-
-def _parameters(summary: Summary) -> str:
-    return ", ".join(f"{name}={value}" for name, value in summary.first.parameters.items()) or NOTHING

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import math
 
 import pytest
 
-import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import play as playing
 from baselines.evaluation.results import read_rows
-from baselines.workers import TOLERANCE, ClusterError, WorkerError, Workers
+from baselines.workers import ClusterError, WorkerError, Workers
 from tests.baselines.losing import LosingCluster
 
 STEPS = 5
-FAR = {"cpu": "another one", "ikgym": ikgym.__version__}
 
 
 @pytest.fixture
@@ -30,19 +26,6 @@ def one_by_one(monkeypatch):
     monkeypatch.setattr(playing, "BLOCK", 1)
 
 
-def on_another_machine(monkeypatch, factor, processor=None):
-    """Has workers say that they are another machine, or processor of the same name, and cost more by a factor."""
-
-    def work(batch, plain=playing.work):
-        results, there = plain(batch)
-        worse = [
-            (dataclasses.replace(row, machine=FAR, total_cost=factor * row.total_cost), one) for row, one in results
-        ]
-        return worse, processor or there
-
-    monkeypatch.setattr(playing, "work", work)
-
-
 def play(episodes=4, **options):
     return evaluate("varga7-random", "dls", episodes=episodes, steps=STEPS, **options)
 
@@ -51,11 +34,12 @@ def costs(rows):
     return [(row.seed, row.total_cost, row.tracking_cost) for row in rows]
 
 
-def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path):
+def test_a_lost_node_changes_nothing(pool, one_by_one, tmp_path, caplog):
     pool.lost = {0, 2}
     rows = play(cluster="ray", out=tmp_path)
     assert costs(rows) == costs(play())
     assert len(pool.units) == 5  # three episodes, two of them twice
+    assert caplog.text.count("its job is retried") == 2
     # Times are those of this machine alone, and a table without them has a dash.
     assert [row.time_p50_us is None for row in rows] == [False, True, True, True]
     assert read_rows(tmp_path / "results.json") == rows
@@ -75,36 +59,12 @@ def test_a_unit_that_kills_every_worker_is_named_and_the_others_are_kept(pool, o
 
 
 def test_another_version_of_the_code_is_refused(pool, monkeypatch):
-    monkeypatch.setattr(playing, "fingerprint", lambda _: "0" * 12)
+    def other(*arguments, plain=playing.play):
+        return [(dataclasses.replace(row, fingerprint="0" * 12), episode) for row, episode in plain(*arguments)]
+
+    monkeypatch.setattr(playing, "play", other)
     with pytest.raises(WorkerError, match="has played something else than dls in varga7-random: it has ikgym"):
         play(cluster="ray")
-
-
-@pytest.mark.parametrize(("factor", "fits"), [(1.0 + 1e-8, True), (1.0 + 1e-5, False)])
-def test_costs_of_other_processors_are_held_against_those_of_this_one(pool, monkeypatch, factor, fits, tmp_path):
-    on_another_machine(monkeypatch, factor)
-    if fits:
-        rows = play(cluster="ray", out=tmp_path)
-        assert [row.machine == FAR for row in rows] == [False, True, True, True]
-        return
-    with pytest.raises(WorkerError, match="expected a relative difference of at most 1e-06"):
-        play(cluster="ray", out=tmp_path)
-    assert not (tmp_path / "results.json").exists()
-
-
-def test_equal_costs():
-    (row,) = play(episodes=1)
-    nan, inf, near = math.nan, math.inf, 1.0 + 1e-15
-    for far, here, tolerance, fits in (
-        (nan, nan, 0.0, True),
-        (inf, inf, 0.0, True),
-        (nan, 1.0, TOLERANCE, False),
-        (1.0, nan, TOLERANCE, False),
-        (1.0, near, 0.0, False),
-        (1.0, near, TOLERANCE, True),
-    ):
-        with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="total_cost is"):
-            playing.compare(*(dataclasses.replace(row, total_cost=cost) for cost in (far, here)), tolerance)
 
 
 def test_nothing_is_overwritten_before_there_is_a_cluster(monkeypatch, tmp_path):
@@ -117,12 +77,3 @@ def test_nothing_is_overwritten_before_there_is_a_cluster(monkeypatch, tmp_path)
     with pytest.raises(ClusterError):
         play(out=tmp_path, overwrite=True, cluster="ray")
     assert read_rows(tmp_path / "results.json") == rows
-
-
-@pytest.mark.parametrize(("processor", "fits"), [(None, False), ("without AVX", True)])
-def test_on_processors_of_one_kind_costs_are_the_same(pool, monkeypatch, processor, fits):
-    for name, value in playing.describe().items():
-        monkeypatch.setitem(FAR, name, value)
-    on_another_machine(monkeypatch, 1.0 + 1e-8, processor)
-    with contextlib.nullcontext() if fits else pytest.raises(WorkerError, match="relative difference of at most 0"):
-        play(cluster="ray")

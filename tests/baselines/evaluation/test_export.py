@@ -41,20 +41,22 @@ def read_csv(file):
 
 def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
     scenario = named()
-    evaluate(scenario, "dls", out=tmp_path, export="csv")
+    evaluate(scenario, "dls", out=tmp_path, export="csv", accelerations=True)
     (file,) = (tmp_path / "export" / "zhang6-lspb").iterdir()
     head, table = read_csv(file)
     names = [f"slider_{i}" for i in range(6)]
-    assert head == ["time [s]", *(f"{n} [rad]" for n in names), *(f"{n} [rad/s]" for n in names)]
+    assert head == ["time [s]", *(f"{name} [rad{per}]" for per in ("", "/s", "/s²") for name in names)]
     track = baselines.track(scenario, "dls")
-    assert table.shape == (STEPS + 1, 13)
+    assert table.shape == (STEPS + 1, 19)
     np.testing.assert_array_equal(table[:, 0], scenario.dt * np.arange(STEPS + 1))
-    np.testing.assert_array_equal(table[0, 1:], [*scenario.start, *np.zeros(6)])
+    np.testing.assert_array_equal(table[0, 1:], [*scenario.start, *np.zeros(12)])
     np.testing.assert_array_equal(table[1:, 1:7], track.q)
-    np.testing.assert_array_equal(table[1:, 7:], track.qdot)
+    np.testing.assert_array_equal(table[1:, 7:13], track.qdot)
+    np.testing.assert_allclose(table[1:, 13:], np.diff(table[:, 7:13], axis=0) / scenario.dt, rtol=1e-12)
     evaluate(circle("tiago", steps=3), "dls", out=tmp_path / "tiago", export=["csv", "csv"])
     (name,) = files(tmp_path / "tiago")
     head, _ = read_csv(tmp_path / "tiago" / "export" / name)
+    assert len(head) == 17
     assert [head[1], head[2], head[9]] == ["torso_lift_joint [m]", "arm_1_joint [rad]", "torso_lift_joint [m/s]"]
 
 
@@ -79,19 +81,6 @@ def test_joint_trajectory_starts_and_ends_at_rest_on_time(tmp_path):
     assert (tmp_path / "again.json").read_text(encoding="utf-8") == text
 
 
-def test_accelerations_are_an_option(tmp_path):
-    scenario = named()
-    given = {"out": tmp_path, "export": ["csv", "joint-trajectory"], "accelerations": True}
-    evaluate(scenario, "dls", **given)
-    folder = tmp_path / "export" / "zhang6-lspb"
-    head, rows = read_csv(next(folder.glob("*.csv")))
-    assert head[-1] == "slider_5 [rad/s²]"
-    np.testing.assert_allclose(rows[1:, 13:], np.diff(rows[:, 7:13], axis=0) / scenario.dt, rtol=1e-12)
-    points = json.loads(next(folder.glob("*.json")).read_text(encoding="utf-8"))["points"]
-    assert {len(point["accelerations"]) for point in points} == {6}
-    assert points[-1]["accelerations"] == [0.0] * 6
-
-
 def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypatch):
     track = baselines.track(named(), "dls")
     track.to_joint_trajectory(tmp_path / "motion.json", accelerations=True)
@@ -101,6 +90,8 @@ def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypat
         ((connection, _, data),) = reader.messages()
         read = store.deserialize_cdr(data, connection.msgtype)
     written = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
+    assert {len(point["accelerations"]) for point in written["points"]} == {6}
+    assert written["points"][-1]["accelerations"] == [0.0] * 6
     assert connection.topic == "/joint_trajectory_controller/joint_trajectory"
     assert connection.msgtype == "trajectory_msgs/msg/JointTrajectory"
     assert list(written) == ["header", "joint_names", "points"]  # no others, which `ros2 topic pub` would refuse

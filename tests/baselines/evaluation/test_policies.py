@@ -285,19 +285,34 @@ def test_a_wrapped_environment_is_scored_below_its_wrappers(solved):
         evaluate(HELIX, Flat(), steps=STEPS)
 
 
+def test_wrappers_change_no_number_of_an_imperfect_plant():
+    scenario = ikgym.scenarios.get("panda-circle").replace(steps=STEPS, plant=ikgym.Plant(q_noise=1e-3))
+    wraps = (None, gym.wrappers.OrderEnforcing)
+    (plain,), (wrapped,) = (evaluate(scenario, Borrowed(scenario), wrap=wrap) for wrap in wraps)
+    assert plain.joint_limit_margin_min is not None
+    assert numbers(wrapped) == numbers(plain)
+
+
 class NoSeed(gym.Wrapper):
     def reset(self, *, seed=None, options=None):
         return self.env.reset()
+
+
+class Skipping(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        self.env.reset(seed=seed)
+        return self.env.reset(options={"step": 3})
 
 
 def test_wrappers_that_change_the_episode_are_refused():
     for wrap, message in (
         (lambda env: 3, "wrap: expected the environment that it was given in wrappers, got 3"),
         (lambda env: gym.wrappers.TimeLimit(env, 5), "ended after 5 of 20 steps"),
-        (NoSeed, r"expected reset\(seed=0\) to reach the environment"),
+        (NoSeed, "expected the episode of varga7-random with seed 2000000 from its start, got another"),
+        (Skipping, "ended after 17 of 20 steps"),
     ):
         with pytest.raises(InvalidInputError, match=message):
-            evaluate(HELIX, Borrowed(), steps=STEPS, wrap=wrap)
+            evaluate("varga7-random", Borrowed("varga7-random"), steps=STEPS, wrap=wrap)
 
 
 # Models of Stable-Baselines3

@@ -41,7 +41,6 @@ def row(**changes):
 def test_numbers_have_four_digits():
     values = {1.423456e7: "1.423e7", 301.25: "301.2", 1234.4: "1234", 0.0: "0", None: "–", np.nan: "–", np.inf: "inf"}
     assert [number(value) for value in values] == list(values.values())
-    assert number(0.012345, 1e3) == "12.35"
 
 
 def test_table():
@@ -120,7 +119,6 @@ def test_several_episodes_are_judged_by_their_cost_ratio_where_it_is_known():
     line = [line for line in text.split("\n") if line.startswith("dls")][-1]
     assert re.split(r"\s{2,}", line) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8", "1"]
     assert re.split(r"\s{2,}", text.split("\n")[4])[3] == "2.000"
-    assert "Cost ratio over the episodes:" in report.readme(rows, command="c", date=DATE)
     assert "total cost over" in report.table([*rows, row(scenario="varga7-random", seed=10)])
 
 
@@ -155,7 +153,7 @@ def test_labels_say_what_is_not_the_default():
         row(policy="unheard_of", parameters={"a": 2}),
         row(policy="alone", parameters={"a": 2}),
     ]
-    assert [one.label for one in summarise(rows)] == [
+    assert [one["policy"] for one in summarise(rows)] == [
         "dls",
         "dls:damping=0.01",
         "unheard_of:a=1",
@@ -165,42 +163,27 @@ def test_labels_say_what_is_not_the_default():
 
 
 def test_readme():
-    text = report.readme([BASE, REFERENCE], command="python -m x", date=DATE)
-    assert "## varga7-fast: 3000 steps" in text
-    assert "| dls | 1.423e7 | 301.2 |" in text
-    assert r"| follow_nominal \* |" in text
-    assert "`python -m x`" in text
-    assert "2026-01-02 03:04 UTC" in text
-    assert r"machine: A \| B, 2 cores, ikgym 0.1.0" in text
-    assert "`damping=0.001`" in text
-    tables = [line for line in text.split("\n") if line.startswith("|")]
-    heads = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
-    assert heads == {13, 4}  # twelve columns of results, three of parameters
-
-
-HOSTILE = (
-    "<script>run()</script> <img src=x onerror=run()> {run()} `{run()}` [x](javascript:run()) ![x](x) *x* _x_ | &lt;"
-)
+    skipped = [Skipped("zhang3-helix", "follow_nominal", "needs a joint path")]
+    text = report.readme([BASE, REFERENCE], skipped, command="python -m x", date=DATE)
+    for part in (
+        "varga7-fast: 3000 steps\n",
+        "command: python -m x",
+        "finished: 2026-01-02 03:04 UTC",
+        "machine: A | B, 2 cores, ikgym 0.1.0",
+        "dls in varga7-fast: gain=1.0, damping=0.001",
+        "skipped: follow_nominal in zhang3-helix: needs a joint path",
+    ):
+        assert part in text
 
 
 def test_nothing_in_a_name_is_markup_in_the_readme():
-    """Read by a parser of Markdown: all of it is text or code."""
+    """Read by a parser of Markdown: a head, and one block of code."""
     markdown_it = pytest.importorskip("markdown_it")
-    rows = [row(scenario=f"{HOSTILE}\n\n# x", policy=f"x:{HOSTILE}", parameters={HOSTILE: HOSTILE}, cost_ratio=0.5)]
-    rows.append(dataclasses.replace(rows[0], seed=1))
-    skipped = [Skipped(HOSTILE, HOSTILE, HOSTILE)]
-    text = report.readme(rows, skipped, command=HOSTILE, date=DATE)
-    blocks = markdown_it.MarkdownIt("commonmark").enable("table").parse(text)
-    parts = [part for block in blocks for part in (block, *(block.children or ()))]
-    kinds = {part.type for part in parts}
-    assert not kinds & {"html_block", "html_inline", "link_open", "image", "strong_open"}
-    assert [part.content for part in parts if part.type == "heading_open" and part.tag == "h1"] == [""]
-    assert sum(part.content == HOSTILE for part in parts if part.type == "code_inline") == 1
-    plain = "".join(part.content for part in parts if part.type in ("text", "text_special", "code_inline"))
-    assert plain.count("{run()}") == plain.count("<script>run()</script>") * 2
-    # MDX, which evaluates what is in braces, sees none.
-    bare = re.sub(r"(`+).*?(?<!`)\1(?!`)", "", text)
-    assert not re.search(r"(?<!\\)[{<]", bare)
+    name = "<script>run()</script> {run()} `{run()}` [x](javascript:run())\n\n# x\n```\n````"
+    rows = [row(scenario=name, policy=f"x:{name}", parameters={name: name}, cost_ratio=0.5)]
+    text = report.readme(rows, [Skipped(name, name, name)], command=name, date=DATE)
+    blocks = markdown_it.MarkdownIt("commonmark").parse(text)
+    assert [block.type for block in blocks] == ["heading_open", "inline", "heading_close", "fence"]
 
 
 def test_the_log_has_the_accelerations_of_the_steps_from_rest():
@@ -219,13 +202,9 @@ def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch)
     (file,) = tmp_path.glob("series/*/*.npz")
     with np.load(file) as arrays:
         log = dict(arrays)
-    for arrays, message in (
-        ({**log, "other": np.zeros(3)}, "There is no array of a log 'other'"),
-        ({name: array for name, array in log.items() if name != "nominal"}, "the array nominal is missing"),
-    ):
-        np.savez(file, **arrays)
-        with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*{message}"):
-            evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
+    np.savez(file, **{name: array for name, array in log.items() if name != "nominal"})
+    with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*the array nominal is missing"):
+        evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
     file.write_bytes(b"nothing")
     with pytest.raises(ResultsError, match=re.escape(str(file))):
         evaluate(**given, policies="dls", resume=True)

@@ -6,6 +6,7 @@ import baselines
 import ikgym
 from baselines.episodes import rollout, rollouts
 from baselines.status import Status
+from tests.bodied import blocked
 from tests.comparison import identical
 
 SEEDS = [2_000_000, 2_000_001, 5]
@@ -13,7 +14,7 @@ STEPS = 25
 
 
 def fields(episode):
-    return {name: value for name, value in vars(episode).items() if name != "time_ns"}
+    return {name: value for name, value in vars(episode).items() if name != "time_ns" and value is not None}
 
 
 def assert_same(together, alone):
@@ -43,6 +44,14 @@ def test_points_that_are_held_and_a_longer_preview():
     policy = baselines.make("rhc_gradient", scenario)
     for seed, episode in zip(SEEDS, rollouts(scenario, policy, SEEDS, preview=5), strict=True):
         assert_same(episode, rollout(scenario, policy, seed, preview=5))
+
+
+def test_collisions():
+    scenario = blocked()
+    policy = baselines.make("dls", scenario)
+    together = rollouts(scenario, policy, [0, 1])
+    assert_same(together[0], rollout(scenario, policy, 0))
+    assert together[0].stopped.any()
 
 
 def test_ticks_add_up_to_the_steps_of_all():
