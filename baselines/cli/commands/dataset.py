@@ -29,8 +29,6 @@ class Options:
     """Seeds of random scenarios: train, validation or test. Scores of agents that learn from test are void."""
     preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None
     """Steps ahead that the policy is shown; its own preview if left out."""
-    resume: bool = False
-    """Continue with the data set in the folder."""
     overwrite: bool = False
     """Replace the data set in the folder."""
 
