@@ -28,14 +28,6 @@ class Arguments(shell.Names, RobotOptions):
 RULES = (Rule(ROBOT_OPTIONS, lambda given: any(_is_urdf(name) for name in given.names), "without a URDF file"),)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: names, or options; returns the exit code."""
-    given = shell.members("arms", ARMS, arguments, Arguments, RULES)
-    if given.names:
-        print("\n\n".join(_shown(name, given) for name in given.names))
-    return 0
-
-
 def _is_urdf(name: str) -> bool:
     return name.endswith(".urdf")
 
@@ -134,5 +126,6 @@ def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> s
 
 
 ARMS = shell.Catalogue(
-    "arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, endings=(".urdf", ".toml")
+    "arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _shown, (".urdf", ".toml")
 )
+main = shell.listed("arms", ARMS, Arguments, RULES)

@@ -12,7 +12,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, parse
+from baselines.cli.parsing import Rule
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.best_known import MARGIN, MEANINGLESS
@@ -67,9 +67,8 @@ RULES = (
 )
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = "ikgym oracle"
     return f"""\
 Searches the cheapest joint paths of whole episodes from many starts, and keeps their costs as records:
 cost ratio = cost / best known cost. A record is not proven to be the minimum.
@@ -188,13 +187,7 @@ def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -
     return None
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: words after the command; returns the exit code, 1 if a record fails the check."""
-    return shell.run(lambda: _carry_out(arguments), lambda: "Stopped. Optima that were found are kept.")
-
-
-def _carry_out(arguments: Sequence[str]) -> int:
-    options = parse(Options, arguments, prog="ikgym oracle", description=manual(), rules=RULES)
+def _work(options: Options, _: str) -> int:
     kept, wrong = 0, 0
     todo = episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)
@@ -209,3 +202,6 @@ def _carry_out(arguments: Sequence[str]) -> int:
     if options.update:
         print(f"{kept} of {len(todo)} records are new or better: {best_known.DATA.name}")
     return 1 if wrong else 0
+
+
+main = shell.Command("oracle", Options, manual, _work, RULES, "Optima that were found are kept.")

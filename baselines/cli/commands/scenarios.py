@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,21 +12,17 @@ from ikgym.arms import Arm
 from ikgym.scenarios import Scenario, durations
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: names, or options; returns the exit code."""
-    return shell.list_members("scenarios", SCENARIOS, arguments)
-
-
 def _scenario_row(name: str) -> tuple[str, ...]:
     scenario = scenarios.get(name)
     return scenario.arm.name, scenario.task.name, f"{scenario.steps}", scenario.source
 
 
-def _scenario(name: str) -> str:
+def _scenario(name: str, _: shell.Names) -> str:
     scenario = scenarios.find(name)
     lines = [f"{scenario.name}: {scenario.steps} steps of {scenario.dt:g} s", ""]
     lines += [scenario.source, ""] if scenario.source else []
-    return "\n".join([*lines, *(f"  {key:16} {value}" for key, value in _parts(scenario).items())])
+    lines += [f"  {key:16} {value}" for key, value in _parts(scenario).items()]
+    return shell.refilled("\n".join(lines))
 
 
 def _parts(scenario: Scenario) -> dict[str, object]:
@@ -101,3 +96,4 @@ SCENARIOS = shell.Catalogue(
     _scenario,
     (".toml",),
 )
+main = shell.listed("scenarios", SCENARIOS, shell.Names)
