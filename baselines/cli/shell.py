@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import os
 import pathlib
-import re
 import shlex
 import shutil
 import sys
@@ -179,21 +178,3 @@ def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
 def numbers(values: Sequence[float] | FloatArray) -> str:
     """Numbers as text, with four digits."""
     return ", ".join(f"{x:.4g}" for x in np.round(np.array(values), 9) + 0.0)
-
-
-def refilled(text: str) -> str:
-    """A text with its paragraphs and items wrapped to the width."""
-    parts: list[str] = []
-    for line in text.splitlines():
-        item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)
-        if not line.strip() or item or not (parts and parts[-1]):
-            parts.append(line.rstrip())
-        else:
-            parts[-1] += f" {line.strip()}"
-    return "\n".join(_filled(part, width()) for part in parts)
-
-
-def _filled(part: str, most: int) -> str:
-    indent = len(part) - len(part.lstrip())
-    hanging = indent + 2 if part.lstrip().startswith("- ") else indent + 4 if indent else 0
-    return textwrap.fill(part, most, subsequent_indent=" " * hanging, break_on_hyphens=False)

@@ -27,8 +27,7 @@ def _policy(name: str, _: shell.Names) -> str:
         f"  {p} = {default!r}" if made is dataclasses.MISSING else f"  {p} = {made()!r}" for p, default, made in given
     ]
     title = f"{name}{' (reference)' if policy.reference else ''}: {policy.__module__}.{policy.__qualname__}"
-    lines = [title, "", _plain(inspect.getdoc(policy) or ""), "", "Defaults:", *(parameters or ["  none"])]
-    return shell.refilled("\n".join(lines))
+    return "\n".join([title, "", _plain(inspect.getdoc(policy) or ""), "", "Defaults:", *(parameters or ["  none"])])
 
 
 def _plain(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 
 import numpy as np
 
@@ -20,9 +21,10 @@ def _scenario_row(name: str) -> tuple[str, ...]:
 def _scenario(name: str, _: shell.Names) -> str:
     scenario = scenarios.find(name)
     lines = [f"{scenario.name}: {scenario.steps} steps of {scenario.dt:g} s", ""]
-    lines += [scenario.source, ""] if scenario.source else []
-    lines += [f"  {key:16} {value}" for key, value in _parts(scenario).items()]
-    return shell.refilled("\n".join(lines))
+    lines += [textwrap.fill(scenario.source, shell.width()), ""] if scenario.source else []
+    for key, value in _parts(scenario).items():
+        lines.append(textwrap.fill(f"  {key:16} {value}", shell.width(), subsequent_indent=19 * " "))
+    return "\n".join(lines)
 
 
 def _parts(scenario: Scenario) -> dict[str, object]:

@@ -24,7 +24,7 @@ from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, SeedResult, train_seeds
 from baselines.workers import Workers
 from ikgym import rl, scenarios
-from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
@@ -158,13 +158,9 @@ def _program() -> str:
 
 def _require_extra() -> None:
     """Checks for the packages that only training needs."""
-    missing = [
-        name
-        for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
-        if importlib.util.find_spec(name) is None
-    ]
-    if missing:
-        raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
+    for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard"):
+        if importlib.util.find_spec(name) is None:
+            raise ModuleNotFoundError(name=name)
 
 
 def parse(arguments: Sequence[str]) -> Command | ByRewards[Any] | Repeat:

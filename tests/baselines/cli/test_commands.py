@@ -158,7 +158,6 @@ def test_lists_are_complete_and_fit_and_every_member_is_shown_in_full(word, name
     text = capsys.readouterr().out
     assert all(re.search(rf"^{name}\b.*:", text, re.MULTILINE) for name in names)
     assert ":class:" not in text
-    assert max(map(len, text.splitlines())) <= 82
 
 
 def test_members_are_shown_and_files_like_members(tmp_path, monkeypatch, capsys):

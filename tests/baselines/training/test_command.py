@@ -144,7 +144,7 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tensorboard" else find(name))
     assert main(["apg", *TINY, "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == 'error: Training needs tensorboard: pip install "ikgym[train]"\n'
+    assert capsys.readouterr().err == 'error: This needs tensorboard: pip install "ikgym[train]"\n'
 
 
 @pytest.mark.slow
