@@ -13,7 +13,7 @@ from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, scenario_of
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.retiming import refusal, retimed
-from baselines.paths.speeds import Speeds, speed_limit
+from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
@@ -91,14 +91,14 @@ def _head(found: Survey) -> list[str]:
 
 def _tool(scenario: Scenario) -> list[str]:
     """The tool at the first pose, and its speeds."""
-    frame, speeds = scenario.frames(scenario.trajectory, 1)[0], Speeds.of(scenario)
+    frame, (linear, angular) = scenario.frames(scenario.trajectory, 1)[0], fastest(scenario)
     begins = f"  begins at ({shell.numbers(frame[-3:])}) m"
     if len(frame) == 12:
         begins += f", the tool's z axis along ({shell.numbers(frame[2:9:3])})"
     limit = speed_limit(scenario.trajectory)
     asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
-    turning = f", the tool turns by {speeds.angular:.3g} rad/s" if speeds.angular > 1e-6 else ""
-    lines = [begins, f"  fastest {speeds.linear:.3g} m/s{asked}{turning}"]
+    turning = f", the tool turns by {angular:.3g} rad/s" if angular > 1e-6 else ""
+    lines = [begins, f"  fastest {linear:.3g} m/s{asked}{turning}"]
     if _unstated(scenario.arm).any():
         lines.append("  acceleration limits are not stated (see --acceleration): velocities alone are checked")
     if scenario.cut_off:
@@ -165,7 +165,7 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
         how += " (no closer: a stop or a singularity is near)"
     can = "It can be driven as it is"
     if driven.duration != found.duration:
-        speed = f"in {driven.duration:.3g} s, at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
+        speed = f"in {driven.duration:.3g} s, at up to {fastest(driven.scenario)[0]:.3g} m/s"
         as_asked = found.drivable_within(REACHED)
         can = f"{can}, and {speed}" if as_asked else f"It cannot be driven in {found.duration:.3g} s, but {speed}"
     hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
