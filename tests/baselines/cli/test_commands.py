@@ -62,9 +62,9 @@ def test_help_of_each_command(word, capsys):
         (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
         (
             ["train", "pop", "--out", "x"],
-            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3, recurrent_ppo,",
+            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3, recurrent_ppo.",
         ),
-        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, recurrent_ppo, or repeat; got --out."),
+        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, recurrent_ppo; got --out."),
         (["train", "ppo", "--env", "ikgym/Track-v0"], "Missing from ikgym train ppo: --out."),
         (["train", "ppo", "--out", "x"], "ppo needs an environment: expected --env, one of ikgym/Reach-v0, ikgym/T"),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
