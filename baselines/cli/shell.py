@@ -135,30 +135,39 @@ class Names:
 N = TypeVar("N", bound=Names)
 
 
-@dataclasses.dataclass(frozen=True)
-class Catalogue(Generic[N]):
-    """A registry for printing."""
+def listed(
+    word: str,
+    kind: str,
+    names: Callable[[], Sequence[str]],
+    row: tuple[tuple[str, ...], Callable[[str], tuple[str, ...]]],
+    full: Callable[[str, N], str],
+    *,
+    endings: tuple[str, ...] = (),
+    options: type[N] = Names,  # type: ignore[assignment]  # the default of N
+    rules: tuple[Rule, ...] = (),
+) -> Command[N]:
+    """A command that prints a registry, or some of its members in full.
 
-    kind: str  # the word for a member
-    names: Callable[[], Sequence[str]]  # gives the names of all members
-    head: tuple[str, ...]  # heads of the columns; the last column fills the line
-    row: Callable[[str], tuple[str, ...]]  # the other cells of a member's line
-    full: Callable[[str, N], str]  # the full description of a member, given the arguments
-    endings: tuple[str, ...] = ()  # suffixes of files that are shown in full like members
-
-
-def listed(word: str, catalogue: Catalogue[N], options: type[N], rules: tuple[Rule, ...] = ()) -> Command[N]:
-    """A command that prints a catalogue, or some of its members in full."""
+    Args:
+        word: The name of the command.
+        kind: The word for a member.
+        names: Gives the names of all members.
+        row: The heads of the columns, and the cells of a member behind its name; the last column fills the line.
+        full: The full description of a member, given the arguments.
+        endings: Suffixes of files that are shown in full like members.
+        options: The arguments.
+        rules: Options that have an effect only together with others.
+    """
 
     def work(given: N, _: str) -> None:
-        known = catalogue.names()
+        known = names()
         for name in given.names:
-            if name not in known and not name.endswith(catalogue.endings):
-                raise UnknownNameError(catalogue.kind, name, known)
+            if name not in known and not name.endswith(endings):
+                raise UnknownNameError(kind, name, known)
         if given.names:
-            print("\n\n".join(catalogue.full(name, given) for name in given.names))
+            print("\n\n".join(full(name, given) for name in given.names))
         else:
-            print(aligned([catalogue.head, *((name, *catalogue.row(name)) for name in known)], width()))
+            print(aligned([(kind, *row[0]), *((name, *row[1](name)) for name in known)], width()))
 
     return Command(word, options, lambda _: f"Lists the {word}, or shows some in full.", work, rules)
 

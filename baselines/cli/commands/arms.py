@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.cli import shell
+from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions
 from baselines.cli.parsing import Rule
-from baselines.cli.robot import ROBOT_OPTIONS, RobotOptions
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
 from ikgym.scenarios import toml
@@ -125,7 +125,13 @@ def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> s
     return f"{head}\n\n{toml.document({'arm': table}).strip()}"
 
 
-ARMS = shell.Catalogue(
-    "arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, _shown, (".urdf", ".toml")
+main = shell.listed(
+    "arms",
+    "arm",
+    arms.names,
+    (("joints", "prismatic", "limits"), _arm_row),
+    _shown,
+    endings=(".urdf", ".toml"),
+    options=Arguments,
+    rules=RULES,
 )
-main = shell.listed("arms", ARMS, Arguments, RULES)

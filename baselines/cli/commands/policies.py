@@ -37,5 +37,4 @@ def _plain(text: str) -> str:
     return text.replace("``", "`")
 
 
-POLICIES = shell.Catalogue("policy", registry.names, ("policy", "what it does"), _policy_row, _policy)
-main = shell.listed("policies", POLICIES, shell.Names)
+main = shell.listed("policies", "policy", registry.names, (("what it does",), _policy_row), _policy)

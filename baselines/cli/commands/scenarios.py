@@ -90,12 +90,11 @@ def _reach(scenario: Scenario) -> str:
     return f"not all: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
 
 
-SCENARIOS = shell.Catalogue(
+main = shell.listed(
+    "scenarios",
     "scenario",
     lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
-    ("scenario", "arm", "task", "steps", "source"),
-    _scenario_row,
+    (("arm", "task", "steps", "source"), _scenario_row),
     _scenario,
-    (".toml",),
+    endings=(".toml",),
 )
-main = shell.listed("scenarios", SCENARIOS, shell.Names)
