@@ -6,7 +6,7 @@ import contextlib
 import pathlib
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -21,16 +21,13 @@ from tqdm import tqdm
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
-from baselines.files import ResultsError, locked, reading, resumed, write_json
+from baselines.files import ResultsError, locked
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from ikgym import scenarios
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
-
-#: Episodes that are written together; they are lost if the process is killed before.
-BLOCK = 16
 
 
 def write(
@@ -41,7 +38,6 @@ def write(
     episodes: int,
     split: str = "train",
     preview: Preview | None = None,
-    resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
 ) -> None:
@@ -54,72 +50,60 @@ def write(
         episodes: Number of episodes, the first seeds of the split.
         split: The split, see :data:`ikgym.scenarios.SPLITS`.
         preview: Steps ahead that the policy is shown; its own preview if left out.
-        resume: Whether to continue with the data set in the folder.
-        overwrite: Whether to replace it.
+        overwrite: Whether to replace the data set in the folder.
         progress: Whether to show a progress bar on stderr.
 
     Raises:
         UnknownNameError: There is no such scenario, policy, parameter or split.
         InvalidInputError: A value is out of range, the policy does not suit the scenario, its episodes do not differ or
             depend on each other, or Minari does not accept the name of the folder.
-        ResultsError: The folder cannot be written, or holds another data set.
+        ResultsError: The folder cannot be written, or holds a data set.
     """
     name, jobs = out.absolute().name, _jobs(scenario, policy, episodes, split, preview)
     try:
         parse_dataset_id(name)
     except (ValueError, TypeError):
         raise InvalidInputError(f"out: expected a name with a version, such as dls-v0; got {name!r}.") from None
-    first = jobs[0]
-    about = {
-        "scenario": first.scenario.name,
-        "fingerprint": first.fingerprint,
-        "policy": first.policy,
-        "parameters": dict(first.parameters),
-        "split": split,
-        "episodes": episodes,
-        "preview": list(first.preview) if isinstance(first.preview, Sequence) else first.preview,
-        "versions": {package: describe()[package] for package in ("ikgym", "python", "numpy", "numba")},
-    }
-    blocks, draft, data = out / "blocks", out / ".draft", out / "data"
+    first, draft, data = jobs[0], out / ".draft", out / "data"
     with locked(out):
-        there = resumed(out / "dataset.json", about, resume=resume, overwrite=overwrite)
-        if there is None and data.exists() and not overwrite:
-            raise ResultsError(f"{out}: expected an empty folder, or that of a data set of ikgym.")
-        for stale in [draft, *([blocks, data] if there is None else [])]:
-            shutil.rmtree(stale, ignore_errors=True)
-        write_json(out / "dataset.json", about)
-        if data.exists():
-            return
-        with tqdm(total=episodes, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True) as bar:
-            for number in range(0, episodes, BLOCK):
-                block = blocks / f"{number:06}"
-                if not block.exists():
-                    _record(jobs[number : number + BLOCK], draft)
-                    block.parent.mkdir(exist_ok=True)
-                    draft.rename(block)
-                bar.update(min(BLOCK, episodes - number))
-        whole = _storage(_environment(first), draft)
-        for block in sorted(blocks.iterdir()):
-            with reading(block, "Begin anew with --overwrite."):
-                whole.update_from_storage(MinariStorage.read(block))
-        # Minari loses the seeds when it copies episodes.
-        seeds = [{"seed": job.seeds.seed} for job in jobs]
-        whole.update_episode_metadata([a | b for a, b in zip(seeds, whole.apply(_costs), strict=True)])
+        if data.exists() and not overwrite:
+            raise ResultsError(f"{data} already exists: replace it with --overwrite, or choose another folder.")
+        shutil.rmtree(draft, ignore_errors=True)  # of a process that was killed
+        env, costs = _environment(first), list[dict[str, float]]()
+        spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
+        storage = MinariStorage.new(draft.absolute(), env_spec=env.spec, **spaces)
+
+        def played() -> Iterator[EpisodeBuffer]:
+            for job in tqdm(jobs, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True):
+                episode = _episode(env, job)
+                costs.append(_costs(episode))
+                yield episode
+
+        storage.update_episodes(played())
+        storage.update_episode_metadata(costs)
         text = ",".join(f"{key}={value!r}" for key, value in first.parameters.items())
-        whole.update_metadata(
+        storage.update_metadata(
             {
                 "dataset_id": name,
                 "minari_version": minari.__version__,
                 "algorithm_name": f"{first.policy}:{text}".rstrip(":"),
                 "description": f"{episodes} episodes of {first.policy} in {first.scenario.name}.",
-                "ikgym": {**about, "machine": describe()},
+                "ikgym": {
+                    "scenario": first.scenario.name,
+                    "fingerprint": first.fingerprint,
+                    "policy": first.policy,
+                    "parameters": dict(first.parameters),
+                    "split": split,
+                    "preview": list(first.preview) if isinstance(first.preview, Sequence) else first.preview,
+                    "machine": describe(),
+                },
             }
         )
-        if "env_spec" not in whole.metadata:
+        if env.spec is None:
             with contextlib.suppress(InvalidInputError):  # a trajectory of the user's own class, which no file can hold
                 first.scenario.save(out / "scenario.toml")
+        shutil.rmtree(data, ignore_errors=True)
         draft.rename(data)
-        shutil.rmtree(blocks)
 
 
 def _jobs(scenario: str | Scenario, policy: AnyPolicy, episodes: int, split: str, preview: Preview | None) -> list[Job]:
@@ -139,17 +123,6 @@ def _environment(job: Job) -> gym.Env[Any, Any]:
     if name in scenarios.names() and fingerprint(scenarios.get(name)) == job.fingerprint:
         return gym.make("ikgym:RedundantIK-v0", scenario=name, **options)  # Minari can make it again
     return RedundantIKEnv(job.scenario, **options)
-
-
-def _record(jobs: Sequence[Job], folder: pathlib.Path) -> None:
-    """Plays episodes and writes them into a folder."""
-    env = _environment(jobs[0])
-    _storage(env, folder).update_episodes(_episode(env, job) for job in jobs)
-
-
-def _storage(env: gym.Env[Any, Any], folder: pathlib.Path) -> MinariStorage:
-    spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
-    return MinariStorage.new(folder.absolute(), env_spec=env.spec, **spaces)
 
 
 def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
@@ -175,7 +148,7 @@ def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
     )
 
 
-def _costs(episode: dict[str, Any]) -> dict[str, float]:
-    names = [name for name in ("tracking_cost", "velocity_cost", "proximity_cost") if name in episode["infos"]]
-    costs = {name: float(add_up(episode["infos"][name])) for name in names}
-    return {"total_cost": float(add_up(-episode["rewards"])), **costs}
+def _costs(episode: EpisodeBuffer) -> dict[str, float]:
+    infos: dict[str, Any] = episode.infos
+    names = [name for name in ("tracking_cost", "velocity_cost", "proximity_cost") if name in infos]
+    return {"total_cost": float(add_up(-episode.rewards)), **{name: float(add_up(infos[name])) for name in names}}

@@ -13,14 +13,12 @@ from baselines import Controller, Drives
 from benchmarks.measuring import FULL, Effort
 from benchmarks.table import Table
 
-#: The rows: policy, scenario, drives, and how references are given.
-LOOPS: dict[str, tuple[str, str, Drives | str, str]] = {
-    "`qp`, perfect drives": ("qp", "panda-circle", Drives(), "coordinates"),
-    "`qp`, drives given": ("qp", "panda-circle", Drives(2, 0.02), "coordinates"),
-    "`qp`, drives identified": ("qp", "panda-circle", "identify", "coordinates"),
-    "`rhc_foresight`, perfect drives": ("rhc_foresight", "varga7-pose-random", Drives(), "coordinates"),
-    "the same, all rotations": ("rhc_foresight", "varga7-pose-random", Drives(), "rotations"),
-    "the same, newest rotation": ("rhc_foresight", "varga7-pose-random", Drives(), "newest"),
+#: The rows: policy, scenario and drives.
+LOOPS: dict[str, tuple[str, str, Drives | str]] = {
+    "`qp`, perfect drives": ("qp", "panda-circle", Drives()),
+    "`qp`, drives given": ("qp", "panda-circle", Drives(2, 0.02)),
+    "`qp`, drives identified": ("qp", "panda-circle", "identify"),
+    "`rhc_foresight`, perfect drives": ("rhc_foresight", "varga7-pose-random", Drives()),
 }
 #: Turns of `effort.steps` calls of each.
 TURNS = 10
@@ -36,7 +34,7 @@ def tables(effort: Effort = FULL) -> list[Table]:
     return [Table("Control loop", note, ("`predict` [µs]", "`step` [µs]", "`step`, p99 [µs]"), rows)]
 
 
-def measured(policy: str, scenario: str, drives: Drives | str, given: str, steps: int, turns: int) -> tuple[Any, Any]:
+def measured(policy: str, scenario: str, drives: Drives | str, steps: int, turns: int) -> tuple[Any, Any]:
     """Durations of `predict`, and of steps on the same measurements, in [µs]; they take turns."""
     which = ikgym.scenarios.get(scenario)
     controller = Controller(which, policy, drives)
@@ -45,26 +43,22 @@ def measured(policy: str, scenario: str, drives: Drives | str, given: str, steps
         controller.warm_up(1)
     predict, step = [], []
     for _ in range(turns):
-        durations, seen = _steps(controller, which, given, steps)
+        durations, seen = _steps(controller, which, steps)
         step += durations
         predict += _predictions(controller.policy, seen)
     return 1e-3 * np.array(predict), 1e-3 * np.array(step)
 
 
-def _steps(controller: Controller, scenario: ikgym.Scenario, given: str, steps: int) -> tuple[list[int], list[Any]]:
+def _steps(controller: Controller, scenario: ikgym.Scenario, steps: int) -> tuple[list[int], list[Any]]:
     """Durations of steps on a perfect arm in [ns], and what its policy saw."""
     controller.reset()
     ahead, durations, observations = controller.ahead, [], []
-    frames = scenario.frames(scenario.episode(0), scenario.steps + ahead + 1)
-    nominal, rotations, positions = scenario.nominal(0, ahead), frames[:, :9].reshape(-1, 3, 3), frames[:, 9:].copy()
-    q, qdot = np.array(scenario.start_of(0)), np.zeros(scenario.joints)
+    nominal, q, qdot = scenario.nominal(0, ahead), np.array(scenario.start_of(0)), np.zeros(scenario.joints)
     for k in range(min(steps, scenario.steps)):
         here = slice(k + 1, k + 1 + ahead)
         pose = scenario.task.coordinates(*scenario.arm.forward(q))
-        which = here if k == 0 or given != "newest" else k + ahead
-        reference = nominal[here] if given == "coordinates" else (rotations[which], positions[which])
         begin = time.perf_counter_ns()
-        command = controller.step(q, pose, reference)
+        command = controller.step(q, pose, nominal[here])
         durations.append(time.perf_counter_ns() - begin)
         left = np.array([1e6])
         observations.append({"q": q, "qdot": qdot, "pose": pose, "nominal": nominal[here], "remaining": left})

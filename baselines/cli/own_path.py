@@ -1,4 +1,4 @@
-"""A path of the user's own on the command line: a scenario, or a CSV file of waypoints with an arm."""
+"""An arm and a path of the user's own, as options that several commands have."""
 
 from __future__ import annotations
 
@@ -9,15 +9,47 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli.parsing import Rule
-from baselines.cli.robot import RobotOptions
-from ikgym import scenarios, tasks
+from ikgym import arms, scenarios, tasks
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import from_csv
-from ikgym.validation import number
+from ikgym.validation import number, per_joint
 
 #: Where nobody states the acceleration of the tool, it comes to its speed within this time in [s].
 SPEEDING_UP = 0.2
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RobotOptions:
+    """The chain of a URDF file, and what the file does not say."""
+
+    base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
+    """Link of a URDF file at which the arm begins; the root if left out."""
+    tip: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
+    """Link at which it ends; needed where several could."""
+    tool: Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")] = None
+    """Tool point in the frame of the tip, in [m]."""
+    acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
+    """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
+
+    def robot(self, name: str) -> Arm:
+        """The arm of a URDF file, or of the catalogue by its name."""
+        urdf = name.endswith(".urdf")
+        return self.accelerated(
+            arms.from_urdf(name, base=self.base, tip=self.tip, tool=self.tool) if urdf else arms.get(name)
+        )
+
+    def accelerated(self, arm: Arm) -> Arm:
+        """The arm with the acceleration limits that are given; the same where none are."""
+        if not self.acceleration:
+            return arm
+        limit = self.acceleration[0] if len(self.acceleration) == 1 else self.acceleration
+        return arm.replace(acceleration_limit=per_joint("--acceleration", limit, arm.joints))
+
+
+#: The names of these options.
+ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--acceleration")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +73,7 @@ class OwnPath(RobotOptions):
     """Control period in [s]: 0.004 by default, or that of the scenario."""
 
 
-_WITH_CSV = ("--base", "--tip", "--tool", "--speed", "--tool-acceleration", "--corner-radius", "--task")
+_WITH_CSV = (*ROBOT_OPTIONS[:3], "--speed", "--tool-acceleration", "--corner-radius", "--task")
 RULES = (Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),)
 
 

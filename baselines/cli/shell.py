@@ -6,13 +6,12 @@ import contextlib
 import dataclasses
 import os
 import pathlib
-import re
 import shlex
 import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 import tyro
@@ -32,6 +31,9 @@ EXTRAS = {
     **{"h5py": "data", "minari": "data", "pinocchio": "urdf", "toppra": "paths", "moviepy": "video", "ray": "cluster"},
 }
 
+
+#: The message after Ctrl-C of commands with ``--resume``.
+RESUMED = "Finished work is in {out}; continue with --resume."
 
 P = TypeVar("P")
 
@@ -67,33 +69,44 @@ def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped."
     return code
 
 
-def run_resumable(
-    kind: type[P],
-    arguments: Sequence[str] | None,
-    prog: str,
-    manual: Callable[[str], str],
-    work: Callable[[P, str], None],
-    rules: Iterable[Rule] = (),
-) -> int:
-    """Reads the options of a command that writes into the folder of ``--out``, does its work, returns the exit code.
+@dataclasses.dataclass(frozen=True)
+class Command(Generic[P]):
+    """A command: called with the words after its name, by default those of the process, it returns the exit code.
 
-    `workers`, `episodes` and `trials`, if there are such options, are checked. The work is called with the options and
-    the whole command line.
+    Args:
+        name: The word behind ``ikgym``.
+        options: The dataclass of its options. `workers`, `episodes` and `trials`, if there are such, are checked.
+        manual: Makes the text of ``--help`` above the options, given the name of the program.
+        work: Does the work, given the options and the whole command line; returns the exit code, or None for 0.
+        rules: Options that have an effect only together with others.
+        kept: The message after Ctrl-C, with ``{out}`` for the folder.
+        module: The module that is the same command, if Python runs it.
     """
-    given, out = sys.argv[1:] if arguments is None else list(arguments), None
 
-    def both() -> int:
-        nonlocal out
-        options = parse(kind, given, prog=prog, description=manual(prog), rules=rules)
-        out = getattr(options, "out", None)
-        for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
-            if (value := getattr(options, name, None)) is not None:
-                whole_number(name, value, at_least=1, at_most=most)
-        work(options, shlex.join([*prog.split(), *given]))
-        return 0
+    name: str
+    options: type[P]
+    manual: Callable[[str], str]
+    work: Callable[[P, str], int | None]
+    rules: tuple[Rule, ...] = ()
+    kept: str = ""
+    module: str = ""
 
-    kept = "Stopped. Finished work is in {}; continue with --resume."
-    return run(both, lambda: "Stopped." if out is None else kept.format(out))
+    def __call__(self, arguments: Sequence[str] | None = None) -> int:
+        """Reads the options and does the work; returns the exit code, see :func:`run`."""
+        given, stopped = sys.argv[1:] if arguments is None else list(arguments), "Stopped."
+        prog = program(self.name, f"python -m {self.module}" if self.module else f"{CONSOLE} {self.name}")
+
+        def both() -> int:
+            nonlocal stopped
+            options = parse(self.options, given, prog=prog, description=self.manual(prog), rules=self.rules)
+            if self.kept:
+                stopped = f"Stopped. {self.kept.format(out=getattr(options, 'out', None))}"
+            for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
+                if (value := getattr(options, name, None)) is not None:
+                    whole_number(name, value, at_least=1, at_most=most)
+            return self.work(options, shlex.join([*prog.split(), *given])) or 0
+
+        return run(both, lambda: stopped)
 
 
 def listing(title: str, names: Iterable[str]) -> str:
@@ -122,38 +135,41 @@ class Names:
 N = TypeVar("N", bound=Names)
 
 
-@dataclasses.dataclass(frozen=True)
-class Catalogue:
-    """A registry for printing."""
+def listed(
+    word: str,
+    kind: str,
+    names: Callable[[], Sequence[str]],
+    row: tuple[tuple[str, ...], Callable[[str], tuple[str, ...]]],
+    full: Callable[[str, N], str],
+    *,
+    endings: tuple[str, ...] = (),
+    options: type[N] = Names,  # type: ignore[assignment]  # the default of N
+    rules: tuple[Rule, ...] = (),
+) -> Command[N]:
+    """A command that prints a registry, or some of its members in full.
 
-    kind: str  # the word for a member
-    names: Callable[[], Sequence[str]]  # gives the names of all members
-    head: tuple[str, ...]  # heads of the columns; the last column fills the line
-    row: Callable[[str], tuple[str, ...]]  # the other cells of a member's line
-    # the full description of a member; the command prints its own where there is none
-    full: Callable[[str], str] | None = None
-    endings: tuple[str, ...] = ()  # suffixes of files that are shown in full like members
+    Args:
+        word: The name of the command.
+        kind: The word for a member.
+        names: Gives the names of all members.
+        row: The heads of the columns, and the cells of a member behind its name; the last column fills the line.
+        full: The full description of a member, given the arguments.
+        endings: Suffixes of files that are shown in full like members.
+        options: The arguments.
+        rules: Options that have an effect only together with others.
+    """
 
+    def work(given: N, _: str) -> None:
+        known = names()
+        for name in given.names:
+            if name not in known and not name.endswith(endings):
+                raise UnknownNameError(kind, name, known)
+        if given.names:
+            print("\n\n".join(full(name, given) for name in given.names))
+        else:
+            print(aligned([(kind, *row[0]), *((name, *row[1](name)) for name in known)], width()))
 
-def list_members(word: str, catalogue: Catalogue, arguments: Sequence[str]) -> int:
-    """A command that prints a catalogue, or some of its members in full; see :func:`members`."""
-    given = members(word, catalogue, arguments, Names)
-    if given.names and catalogue.full is not None:
-        print("\n\n".join(_refilled(catalogue.full(name), width()) for name in given.names))
-    return 0
-
-
-def members(word: str, catalogue: Catalogue, arguments: Sequence[str], kind: type[N], rules: Iterable[Rule] = ()) -> N:
-    """The arguments of a command that shows members of a catalogue; prints the catalogue where none is named."""
-    description = f"Lists the {word}, or shows some in full."
-    given = parse(kind, arguments, prog=f"{CONSOLE} {word}", description=description, rules=rules)
-    known = catalogue.names()
-    for name in given.names:
-        if name not in known and not name.endswith(catalogue.endings):
-            raise UnknownNameError(catalogue.kind, name, known)
-    if not given.names:
-        print(aligned([catalogue.head, *((name, *catalogue.row(name)) for name in known)], width()))
-    return given
+    return Command(word, options, lambda _: f"Lists the {word}, or shows some in full.", work, rules)
 
 
 def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
@@ -171,21 +187,3 @@ def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
 def numbers(values: Sequence[float] | FloatArray) -> str:
     """Numbers as text, with four digits."""
     return ", ".join(f"{x:.4g}" for x in np.round(np.array(values), 9) + 0.0)
-
-
-def _refilled(text: str, most: int) -> str:
-    """A text with its paragraphs and items wrapped."""
-    parts: list[str] = []
-    for line in text.splitlines():
-        item = re.match(r" *- | {0,4}\w+:( |$)| *\w.*?  |  \w+ = ", line)
-        if not line.strip() or item or not (parts and parts[-1]):
-            parts.append(line.rstrip())
-        else:
-            parts[-1] += f" {line.strip()}"
-    return "\n".join(_filled(part, most) for part in parts)
-
-
-def _filled(part: str, most: int) -> str:
-    indent = len(part) - len(part.lstrip())
-    hanging = indent + 2 if part.lstrip().startswith("- ") else indent + 4 if indent else 0
-    return textwrap.fill(part, most, subsequent_indent=" " * hanging, break_on_hyphens=False)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.controller import kernels
 from baselines.controller.drives import IDENTIFY, LONGEST, Drives, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
-from baselines.controller.reference import Pose, Window, coordinates, numbers
+from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers
 from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import remembered
@@ -89,7 +89,7 @@ class Controller:
         delay = LONGEST if self._given is None else self._given.delay
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
         self._shown = len(offsets(self.policy.preview))
-        self._window, self._joints, self._kind = Window(problem.task), problem.model.joints, problem.task.kind
+        self._joints, self._kind = problem.model.joints, problem.task.kind
         self.reset()
 
     def reset(self) -> None:
@@ -99,7 +99,6 @@ class Controller:
         self._stopped: StopReason | None = None
         self._last, self._kept, self._counters = np.zeros(n), np.zeros((2, n)), np.zeros(3)
         self._made = 0
-        self._window.clear()
 
     def step(
         self,
@@ -118,8 +117,7 @@ class Controller:
             pose: Measured pose of the tool: task coordinates of shape (m,), or rotation (3, 3) and position (3,) in
                 [m]. None where it is not measured: then it is the model's at q.
             reference: The pose wanted at the end of this period, and then as many as the policy looks ahead, see
-                :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m]. Once these
-                were given, the newest rotation (3, 3) and position (3,) will do: the others move up.
+                :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
             qdot: Measured joint velocities in [rad/s] or [m/s]; what was returned last if left out. Shape (n,).
             q_age: Control periods since q was measured.
             pose_age: The same of the pose.
@@ -132,7 +130,7 @@ class Controller:
         """
         measured = numbers("q", q, (self._joints,))
         speed = self._last.copy() if qdot is None else self._speed(qdot)
-        seen, ahead = self._seen(pose, measured), self._window.ahead(reference)
+        seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         if self._stopped is None:
             ages = float(q_age), float(pose_age)
@@ -258,7 +256,5 @@ class Controller:
 
     def _touch(self) -> None:
         """Compiles what the first periods may not need: poses as rotation and position, and a stop."""
-        pose = np.eye(3), np.zeros(3)
-        self._seen(pose, np.zeros(self._joints))
-        self._window.ahead((pose[0][None], pose[1][None]))
+        self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
         self._braked()

@@ -1,4 +1,4 @@
-"""Kernels of a control loop: guards, limits, stops, and the sliding window of a reference."""
+"""Kernels of a control loop: guards, limits, stops, and the conversion of poses."""
 
 from __future__ import annotations
 
@@ -116,15 +116,6 @@ def brake(change, last, out):
     for j in range(last.shape[0]):
         last[j] = math.copysign(max(abs(last[j]) - change[j], 0.0), last[j])
         out[j] = last[j]
-
-
-@kernel
-def same(given, kept):
-    """Whether arrays of one shape have the same numbers, bit for bit: as integers, several at a time."""
-    here, there, different = given.ravel().view(np.int64), kept.ravel().view(np.int64), np.int64(0)
-    for i in range(here.shape[0]):
-        different |= here[i] ^ there[i]
-    return different == 0
 
 
 @kernel

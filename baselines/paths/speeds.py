@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -16,24 +15,16 @@ from ikgym.trajectories import PathTrajectory, Trajectory
 POINTS = 4001
 
 
-@dataclasses.dataclass(frozen=True)
-class Speeds:
-    """Largest speeds of the tool along a path in [m/s] and [rad/s]; 0 where there is no orientation."""
-
-    linear: float
-    angular: float
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> Speeds:
-        """The speeds of the reference trajectory of a scenario, from its beginning to its end."""
-        times = np.linspace(0.0, path_duration(scenario), POINTS)
-        frames = scenario.trajectory.frames(times, scenario.arm)
-        linear = np.linalg.norm(np.diff(frames[:, -3:], axis=0), axis=1)
-        angular = np.zeros(1)
-        if scenario.task.has_orientation:
-            rotations = frames[:, :9].reshape(-1, 3, 3)
-            angular = np.array([geodesic_angle(a, b) for a, b in itertools.pairwise(rotations)])
-        return cls(float(linear.max() / times[1]), float(angular.max() / times[1]))
+def fastest(scenario: Scenario) -> tuple[float, float]:
+    """Largest speeds of the tool along the whole path in [m/s] and [rad/s]; 0 where there is no orientation."""
+    times = np.linspace(0.0, path_duration(scenario), POINTS)
+    frames = scenario.trajectory.frames(times, scenario.arm)
+    linear = np.linalg.norm(np.diff(frames[:, -3:], axis=0), axis=1)
+    angular = np.zeros(1)
+    if scenario.task.has_orientation:
+        rotations = frames[:, :9].reshape(-1, 3, 3)
+        angular = np.array([geodesic_angle(a, b) for a, b in itertools.pairwise(rotations)])
+    return float(linear.max() / times[1]), float(angular.max() / times[1])
 
 
 def speed_limit(trajectory: Trajectory) -> tuple[float, str] | None:

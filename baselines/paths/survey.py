@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.paths.motion import Motion, ideal, in_time, path_duration, played
 from baselines.paths.starts import starts
-from baselines.paths.timing import JointPath, Limits, Timing, shortest
+from baselines.paths.timing import Timing, grid, shortest
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray
@@ -197,24 +197,19 @@ def _branches(scenario: Scenario, starts: FloatArray, slowing: float) -> list[Br
     return [branch_of(scenario, motion.of(row), timing) for row in range(len(starts))]
 
 
-def _shares(motion: Motion) -> FloatArray:
-    """The shares of the path that are reached before the first pose that is not. Shape (N,)."""
-    missed = (motion.position_error > REACHED[0]) | (motion.orientation_error > REACHED[1])
-    shares: FloatArray = np.where(missed.any(axis=0), np.argmax(missed, axis=0) / len(missed), 1.0)
-    return shares
-
-
 def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
     """A branch from the motion of one start, played in the timing."""
     q, dt, arm = motion.q[:, 0], motion.times[1], scenario.arm
     slowing = timing.duration / float(timing.progress[-1])
     moving = q[int(SETTLED / dt) if slowing > 1.0 else 0 :]
-    reached = float(_shares(motion)[0])
+    missed = (motion.position_error > REACHED[0]) | (motion.orientation_error > REACHED[1])
+    reached = float(np.argmax(missed) / len(missed)) if missed.any() else 1.0
     timings: list[Timing | None] = [None, None]
     if reached == 1.0:
-        path = JointPath.of(timing.of(scenario.trajectory).base_times(motion.times), q, scenario.largest_qdot)
-        limits = USED[0] * scenario.largest_qdot, USED[1] * arm.acceleration_limit, scenario.dt
-        timings = [shortest(path, Limits(*limits, rate)) for rate in (np.inf, 1.0)]
+        progress = timing.of(scenario.trajectory).base_times(motion.times)
+        rows = grid(progress, q, scenario.largest_qdot)
+        limits = {"velocity": USED[0] * scenario.largest_qdot, "acceleration": USED[1] * arm.acceleration_limit}
+        timings = [shortest(progress[rows], q[rows], **limits, dt=scenario.dt, rate=rate) for rate in (np.inf, 1.0)]
     return Branch(
         start=q[0],
         given=scenario.start is not None and bool((q[0] == scenario.start).all()),

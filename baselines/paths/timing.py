@@ -20,39 +20,6 @@ FASTEST = 6.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class JointPath:
-    """Joint coordinates over the time of a trajectory, at grid points."""
-
-    progress: FloatArray  # times of the trajectory in [s], rising from 0. Shape (k,)
-    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (k, n)
-
-    @classmethod
-    def of(cls, progress: FloatArray, q: FloatArray, fastest: FloatArray) -> JointPath:
-        """A path with points where joints move and where time goes by.
-
-        Args:
-            progress: Shape (k,).
-            q: Shape (k, n).
-            fastest: Velocity limits in [rad/s] or [m/s], which say how much of a motion a joint's is. Shape (n,).
-        """
-        moved = np.append(0.0, np.cumsum(np.max(np.abs(np.diff(q, axis=0)) / fastest, axis=1)))
-        along = moved / max(moved[-1], 1e-12) + progress / progress[-1]
-        chosen = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], POINTS)).clip(0, len(q) - 1))
-        rising = chosen[np.append(True, np.diff(progress[chosen]) > 1e-9 * progress[-1])]
-        return cls(progress[rising], q[rising])
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Limits:
-    """Limits that a timing keeps."""
-
-    velocity: FloatArray  # in [rad/s] or [m/s]. Shape (n,)
-    acceleration: FloatArray  # in [rad/s²] or [m/s²], inf where there is none. Shape (n,)
-    dt: float  # the control period in [s]
-    rate: float = np.inf  # largest rate of the new time against the old one; inf for none
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
 class Timing:
     """A trajectory's time over a new one; see :class:`ikgym.trajectories.RetimedTrajectory`. Shapes (k,)."""
 
@@ -80,34 +47,57 @@ class Timing:
         return RetimedTrajectory(trajectory, self.times, self.progress, self.rates)
 
 
-def shortest(path: JointPath, limits: Limits) -> Timing | None:
-    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still."""
+def grid(progress: FloatArray, q: FloatArray, velocity: FloatArray) -> npt.NDArray[np.int64]:
+    """Rows of a joint path, more of them where joints move and where time goes by; arguments as of :func:`shortest`."""
+    moved = np.append(0.0, np.cumsum(np.max(np.abs(np.diff(q, axis=0)) / velocity, axis=1)))
+    along = moved / max(moved[-1], 1e-12) + progress / progress[-1]
+    chosen = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], POINTS)).clip(0, len(q) - 1))
+    rows: npt.NDArray[np.int64] = chosen[np.append(True, np.diff(progress[chosen]) > 1e-9 * progress[-1])]
+    return rows
+
+
+def shortest(
+    progress: FloatArray,
+    q: FloatArray,
+    *,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    dt: float,
+    rate: float = np.inf,
+) -> Timing | None:
+    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still.
+
+    Args:
+        progress: Times of a trajectory in [s], rising from 0. Shape (k,).
+        q: Joint coordinates at these times, in [rad] or [m]. Shape (k, n).
+        velocity: Velocity limits in [rad/s] or [m/s]. Shape (n,).
+        acceleration: Acceleration limits in [rad/s²] or [m/s²], inf where there is none. Shape (n,).
+        dt: The control period in [s].
+        rate: The largest rate of the old time in the new one; inf for none.
+    """
     import toppra
 
     logging.getLogger("toppra").setLevel(logging.ERROR)
-    moved = np.abs(np.diff(path.q, axis=0)) / limits.velocity
+    moved = np.abs(np.diff(q, axis=0)) / velocity
     # In terms of the time that the velocity limits alone would take, so that rates are about 1.
-    unit = path.progress[-1] / max(float(moved.max(axis=1).sum()), 1e-9)
-    along, fastest = path.progress / unit, min(limits.rate / unit, FASTEST)
+    unit = progress[-1] / max(float(moved.max(axis=1).sum()), 1e-9)
+    along, fastest = progress / unit, min(rate / unit, FASTEST)
     # The rate is the velocity of one more coordinate: the progress itself.
-    curve = toppra.SplineInterpolator(along, np.column_stack([path.q, along]))
-    bounds = np.append(limits.velocity, fastest)
-    hardest = np.append(np.minimum(limits.acceleration, limits.velocity / AT_ONCE), fastest / AT_ONCE)
+    curve = toppra.SplineInterpolator(along, np.column_stack([q, along]))
+    bounds = np.append(velocity, fastest)
+    hardest = np.append(np.minimum(acceleration, velocity / AT_ONCE), fastest / AT_ONCE)
     constraints = [toppra.constraint.JointVelocityConstraint(bounds)]
     constraints += [toppra.constraint.JointAccelerationConstraint(hardest)]
     search = _search()(constraints, curve, gridpoints=along, solver_wrapper="seidel")
-    ends = [_at_rest(curve(along[i], 1)[:-1], limits, fastest) for i in (0, -1)]
+    # The largest rates at the ends: from rest and to rest within a control period.
+    change = np.minimum(acceleration * dt, velocity)
+    slopes = [np.abs(curve(along[i], 1)[:-1]) for i in (0, -1)]
+    ends = [float(np.min(change / np.maximum(slope, change / fastest))) for slope in slopes]
     first = search.compute_controllable_sets(0.0, ends[1])[0]
     if np.isnan(first).any():
         return None
     rates = search.compute_parameterization(min(ends[0], 0.999 * float(np.sqrt(first[1]))), ends[1])[1]
-    return None if rates is None or np.isnan(rates).any() else _timing(path.progress, rates * unit)
-
-
-def _at_rest(slope: FloatArray, limits: Limits, most: float) -> float:
-    """The largest rate at an end: from rest or to rest within a control period."""
-    change = np.minimum(limits.acceleration * limits.dt, limits.velocity)
-    return float(np.min(change / np.maximum(np.abs(slope), change / most)))
+    return None if rates is None or np.isnan(rates).any() else _timing(progress, rates * unit)
 
 
 def _timing(progress: FloatArray, rates: FloatArray) -> Timing | None:

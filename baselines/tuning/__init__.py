@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from baselines.tuning.search import SPLIT, Search, searches
-from baselines.tuning.trials import run
+from baselines.tuning.search import SPLIT, Search, run, searches
 
 __all__ = ("SPLIT", "Search", "run", "searches")

@@ -1,23 +1,30 @@
-"""The search for the settings of one solver: its episodes and their cost."""
+"""The search for the settings of solvers: trials of Optuna, kept in a journal, each the cost of validation episodes."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import operator
+import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import optuna
-from optuna.trial import Trial
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+from optuna.trial import Trial, TrialState
 
 from baselines import registry
-from baselines.canonical import canonical
+from baselines.canonical import DIGITS, canonical, rounded
 from baselines.episodes import rollouts
+from baselines.files import ResultsError, check_flags, read_bytes, reading
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from baselines.spec import parse_policy
 from baselines.tuning.ranges import RANGES, Range, nested, of, read, suggested
+from baselines.workers import Workers, finished
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -27,6 +34,10 @@ from ikgym.validation import whole_number
 SPLIT, EPISODES = "validation", 64
 #: Episodes that are played before a trial can be pruned for the first time.
 FIRST = 8
+#: The file with the trials of a folder, for Optuna.
+JOURNAL = "study.journal"
+#: States of trials that count.
+DONE = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,19 +69,17 @@ class Search:
         """
         settings = suggested(trial, self.ranges, parse_policy(self.spec)[1])
         trial.set_user_attr("settings", settings)
-        logarithms: list[float] = []
-        while len(logarithms) < len(self.seeds):
-            part = self.seeds[len(logarithms) : max(FIRST, 2 * len(logarithms))]
-            logarithms += np.log(self.costs(settings, part)).tolist()
-            trial.report(float(np.exp(np.mean(logarithms))), len(logarithms))
-            if len(logarithms) < len(self.seeds) and trial.should_prune():
+        costs: list[float] = []
+        while len(costs) < len(self.seeds):
+            costs += self.costs(settings, self.seeds[len(costs) : max(FIRST, 2 * len(costs))])
+            trial.report(_mean(costs), len(costs))
+            if len(costs) < len(self.seeds) and trial.should_prune():
                 raise optuna.TrialPruned
-        return float(np.exp(np.mean(logarithms)))
+        return _mean(costs)
 
     def costs(self, settings: Mapping[str, Any], seeds: Sequence[int]) -> list[float]:
         """The total costs of episodes with some settings."""
-        played = rollouts(self.scenario, self.make(settings), seeds)
-        return [float(add_up(one.cost)) for one in played]
+        return [float(add_up(one.cost)) for one in rollouts(self.scenario, self.make(settings), seeds)]
 
     def make(self, settings: Mapping[str, Any]) -> Any:
         """The solver with some settings.
@@ -80,12 +89,6 @@ class Search:
         """
         name, parameters = parse_policy(self.spec)
         return registry.make(name, self.scenario, **{**parameters, **settings})
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """The values that must be equal when a search is resumed."""
-        about = {"fingerprint": fingerprint(self.scenario), "episodes": len(self.seeds), "seed": self.seed}
-        return about | {"ranges": canonical(dict(self.ranges))}
 
 
 def searches(
@@ -116,9 +119,6 @@ def searches(
     seeds, ranges = scenarios.seeds(SPLIT, episodes), {**read(RANGES), **({} if file is None else read(file))}
     whole_number("seed", seed, at_least=0)
     found = [Search(scenario, spec, of(spec, ranges), seeds, seed) for spec in policies or ranges]
-    names = [one.spec.partition(":")[0] for one in found]
-    if file is not None and not any(spec.partition(":")[0] in names for spec in read(file)):
-        raise InvalidInputError(f"{file}: expected ranges of a solver that is searched, {', '.join(policies)}.")
     if not policies:
         found = [one for one in found if _suits(one)]
     for one in found:
@@ -128,6 +128,94 @@ def searches(
             for value in line.get("choices") or (line["low"], line["high"]):
                 one.make(needed | nested(name, value, {**given, **needed}))
     return found
+
+
+def run(
+    folder: pathlib.Path, wanted: Sequence[Search], trials: int, *, workers: int, resume: bool, overwrite: bool
+) -> list[dict[str, Any]]:
+    """Searches, and returns the best settings of each solver; the caller has locked the folder.
+
+    Args:
+        folder: Where the journal of Optuna is kept.
+        wanted: The searches.
+        trials: Trials of each solver, pruned ones included.
+        workers: Processes that play trials at the same time; with several, the result depends on their order.
+        resume: Whether to continue with the trials in the folder.
+        overwrite: Whether to replace them.
+
+    Returns:
+        For each solver: `spec`, best `settings`, number of trials `tried`, cost by `default` and when `tuned`.
+
+    Raises:
+        InvalidInputError: There are too many workers, or none.
+        ResultsError: There is a journal and neither flag is given, or it is of another search, or damaged.
+        WorkerError: A worker died.
+    """
+    file, crew = folder / JOURNAL, Workers(workers)
+    check_flags(file, resume=resume, overwrite=overwrite)
+    if overwrite:
+        file.unlink(missing_ok=True)
+    pathlib.Path(f"{file}.lock").unlink(missing_ok=True)  # of a process that was killed
+    with reading(file, "Begin again with --overwrite."):
+        if file.exists():  # without a line that was not written to its end
+            os.truncate(file, read_bytes(file).rfind(b"\n") + 1)
+        for one in wanted:
+            _begin(file, one)
+    units = [(file, one, trials, worker) for one in wanted for worker in range(crew.number)]
+    if crew.here:
+        for unit in units:
+            _work(unit)
+    else:
+        # Not retried: a killed process may leave the journal locked.
+        with contextlib.closing(finished(_work, units, crew, tries=1)) as done:
+            for _, future in done:
+                future.result()
+    return [_best(_study(file, one), one) for one in wanted]
+
+
+def _study(file: pathlib.Path, search: Search) -> optuna.Study:
+    # Optuna's default lock is a symbolic link, which a relative path leaves dangling.
+    storage = JournalStorage(JournalFileBackend(str(file), lock_obj=JournalFileOpenLock(str(file))))
+    return optuna.create_study(study_name=search.spec, storage=storage, load_if_exists=True)
+
+
+def _begin(file: pathlib.Path, search: Search) -> None:
+    """Begins a study, or continues the same one."""
+    study = _study(file, search)
+    about = {"fingerprint": fingerprint(search.scenario), "episodes": len(search.seeds), "seed": search.seed}
+    about |= {"ranges": canonical(dict(search.ranges))}
+    if (known := study.user_attrs.get("about", about)) != about:
+        names = ", ".join(name for name in about if known.get(name) != about[name])
+        raise ResultsError(f"{file} has a search of {search.spec} with other {names}. Choose another folder.")
+    study.set_user_attr("about", about)
+    for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
+        study.tell(trial.number, state=TrialState.FAIL)
+
+
+def _work(unit: tuple[pathlib.Path, Search, int, int]) -> None:
+    """Plays trials until there are enough."""
+    file, search, trials, worker = unit
+    study = _study(file, search)
+    while (done := len(study.get_trials(deepcopy=False, states=DONE))) < trials:
+        # Seeded for each trial, so that a search that is stopped and resumed comes to the same trials.
+        words = np.random.SeedSequence([search.seed, worker, done]).generate_state(1)
+        study.sampler = optuna.samplers.TPESampler(seed=int(words[0]))
+        study.optimize(search, n_trials=1)
+
+
+def _best(study: optuna.Study, search: Search) -> dict[str, Any]:
+    default, trials = _mean(search.costs({}, search.seeds)), study.get_trials(deepcopy=False, states=DONE)
+    complete: list[tuple[float, dict[str, Any]]] = [
+        (one.value, one.user_attrs["settings"]) for one in trials if one.state is TrialState.COMPLETE and one.value
+    ]
+    cost, settings = min([(default, {}), *complete], key=operator.itemgetter(0))
+    digits = {"default": rounded(default, DIGITS), "tuned": rounded(cost, DIGITS)}
+    return {"spec": search.spec, "settings": settings, "tried": len(trials) + 1, **digits}
+
+
+def _mean(costs: Sequence[float]) -> float:
+    """The geometric mean."""
+    return float(np.exp(np.mean(np.log(costs))))
 
 
 def _suits(search: Search) -> bool:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import graphlib
 import io
-import math
 import pathlib
 from typing import Any, NamedTuple
 
@@ -52,7 +50,8 @@ class DrawnArm:
         self._frames = [self._scene.add_frame(name, show_axes=False) for name in self.names[1:]]
         self._joints = self._cylinders(colour) if shapes is None else []
         for number, shape in enumerate(shapes or ()):
-            self._scene.add_mesh_trimesh(f"{self.names[shape.frame]}/mesh_{number}", shape.mesh)
+            name = f"{self.names[shape.frame]}/mesh_{number}"
+            self._scene.add_mesh_simple(name, shape.mesh.vertices, shape.mesh.faces, color=colour)
         ball = f"{self.names[-1]}/tool"
         self._tool = self._scene.add_icosphere(ball, radius=TOOL * size(arm), color=FREE, position=arm.tool)
 
@@ -60,7 +59,7 @@ class DrawnArm:
         """Moves it to joint coordinates in [rad] or [m], of shape (n,), in the colours of a reading."""
         for frame, position, wxyz in zip(self._frames, *joint_frames(self._arm, q), strict=True):
             frame.position, frame.wxyz = position, wxyz
-        for handle, colour in zip(self._joints, reading.joints, strict=False):  # meshes have their own colours
+        for handle, colour in zip(self._joints, reading.joints, strict=False):  # meshes have the colour of their policy
             handle.color = colour
         self._tool.color = reading.tool
 
@@ -119,43 +118,14 @@ class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
             raise InvalidInputError(f"{file}: expected a mesh of the formats {', '.join(FORMATS)}, got {kind!r}")
         content = read_user_file(file, self._left)
         self._left -= len(content)
-        if kind == "dae" and _nodes(parse(content)) > MOST_PARTS:
-            raise InvalidInputError(f"{file}: expected at most {MOST_PARTS} nodes, those of <instance_node> included")
-        scene = trimesh.load(
-            io.BytesIO(content), kind, resolver=_Folder(str(file)), force="scene", skip_materials=skip_materials
-        )
+        # A node that is made of instances of others can make a billion of a kilobyte.
+        if kind == "dae" and any(element.tag.endswith("instance_node") for element in parse(content).iter()):
+            raise InvalidInputError(f"{file}: expected a COLLADA file without <instance_node>")
+        scene = trimesh.load(io.BytesIO(content), kind, force="scene", skip_materials=True)
         for one in scene.geometry.values():
             if not isinstance(one, trimesh.Trimesh) or one.vertices.shape[1:] != (3,):
                 raise InvalidInputError(f"{file}: expected triangles in space, got a {type(one).__name__}")
         return scene if geometry.mesh.scale is None else scene.scaled(geometry.mesh.scale)
-
-
-def _nodes(root: Any) -> float:
-    """The nodes of a COLLADA file; one may be made of instances of others, so that a kilobyte makes a billion."""
-    nodes = [element for element in root.iter() if element.tag.endswith("node") and "instance" not in element.tag]
-    parts = {
-        node.get("id", number): [one.get("url", "")[1:] for one in node.iter() if one.tag.endswith("instance_node")]
-        for number, node in enumerate(nodes)
-    }
-    sizes: dict[Any, int] = {}
-    try:
-        for name in graphlib.TopologicalSorter(parts).static_order():
-            sizes[name] = 1 + sum(sizes[part] for part in parts.get(name, ()))
-    except graphlib.CycleError:
-        return math.inf
-    return sum(sizes.values())
-
-
-class _Folder(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]  # trimesh has no types here
-    """The files that a mesh refers to, such as materials and pictures: those in its folder."""
-
-    def get(self, name: str) -> bytes:
-        """The content of a file."""
-        folder = pathlib.Path(self.parent).resolve()
-        file = (folder / name.strip()).resolve()
-        if not file.is_relative_to(folder):
-            raise FileNotFoundError(name)
-        return read_user_file(file, MOST_BYTES)
 
 
 def read_urdf(file: pathlib.Path, arm: Arm) -> list[Shape]:

@@ -95,13 +95,6 @@ class Follower:
         stopped = self._controller.stopped
         self.status = Status(int(self._controller.report.status[0])).label if stopped is None else stopped.label
 
-    def errors(self, approach: Approach) -> tuple[float, float]:
-        """Distance in [m] and angle in [rad] from where the reference is now; NaN where the task has no orientation."""
-        (rotation, position), frame = self._scenario.arm.forward(self.q), approach.frame
-        oriented = self._scenario.task.has_orientation
-        angle = geodesic_angle(frame[:9].reshape(3, 3), rotation) if oriented else np.nan
-        return float(np.linalg.norm(frame[9:] - position)), float(angle)
-
 
 def follower(stage: Stage, policy: str) -> Follower | None:
     """The follower of a policy; None if it has privileged information or needs an environment."""

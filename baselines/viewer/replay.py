@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.utils import seeding
 from tqdm import tqdm
 
 import baselines
@@ -20,9 +19,9 @@ from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.obstacles.solids import solids_of
 from ikgym.scenarios import Scenario
-from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray, whole_number
 
 # Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
@@ -43,7 +42,6 @@ class Stage:
     start: FloatArray  # joint coordinates at the start, in [rad] or [m]. Shape (n,)
     # the reference; its rotation is that of the tool at the start if the task has none. (steps + 1, 12)
     frames: FloatArray
-    errors: tuple[float, float]  # errors of position in [m] and of orientation in [rad] at the start
     # largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's own
     # reference, in [rad] the angle that :meth:`ikgym.arms.Arm.inverse` weighs equally
     pace: tuple[float, float]
@@ -54,10 +52,7 @@ class Stage:
         whole = shown = scenarios.find(scenario)
         if steps is not None:
             shown = whole.replace(steps=min(whole_number("steps", steps, at_least=1), whole.steps))
-        simulator = Simulator(shown, None, 1)
-        generator = seeding.np_random(whole_number("seed", seed, at_least=0))[0]
-        simulator.reset(np.ones(1, dtype=np.bool_), [generator])
-        out, start = simulator.observe(), simulator.true_q[0].copy()
+        start = shown.start_of(whole_number("seed", seed, at_least=0))
         points, length = whole.points(), size(whole.arm)
         frames = whole.frames(whole.episode(seed), int(points[-1]) + 1)[points]
         if not whole.task.has_orientation:
@@ -65,8 +60,14 @@ class Stage:
             frames = np.hstack([np.broadcast_to(rotation, (len(frames), 9)), frames])
         shift = float(np.linalg.norm(np.diff(frames[:, 9:], axis=0), axis=1).sum()) / whole.steps
         shift = shift or SLOW * length * whole.dt
-        errors = float(out.position_error[0]), float(out.orientation_error[0])
-        return cls(shown, seed, start, frames[: shown.steps + 1], errors, (shift, shift / (LENGTH_OF_RADIAN * length)))
+        return cls(shown, seed, start, frames[: shown.steps + 1], (shift, shift / (LENGTH_OF_RADIAN * length)))
+
+    def errors(self, q: FloatArray, frame: FloatArray) -> tuple[float, float]:
+        """Distance in [m] and angle in [rad] of the tool at q (n,) from a frame (12,); NaN without an orientation."""
+        rotation, position = self.scenario.arm.forward(q)
+        oriented = self.scenario.task.has_orientation
+        angle = geodesic_angle(frame[:9].reshape(3, 3), rotation) if oriented else np.nan
+        return float(np.linalg.norm(frame[9:] - position)), float(angle)
 
     @functools.cached_property
     def boxes(self) -> FloatArray:
@@ -81,15 +82,14 @@ class Stage:
 
 
 class Replay(NamedTuple):
-    """The episode of one policy; row 0 is the start, row k the state after step k."""
+    """The episode of one policy; row k is the state after step k, row 0 the start with errors and status of step 1."""
 
     policy: str
     q: FloatArray  # true joint coordinates in [rad] or [m]. Shape (steps + 1, n)
     position_error: FloatArray  # in [m]. Shape (steps + 1,)
     orientation_error: FloatArray  # in [rad], NaN where the task has no orientation. Shape (steps + 1,)
     cost: FloatArray  # accumulated cost. Shape (steps + 1,)
-    # values of :class:`baselines.Status`; row 0 repeats the first step. Shape (steps + 1,)
-    statuses: npt.NDArray[np.int64]
+    statuses: npt.NDArray[np.int64]  # values of :class:`baselines.Status`. Shape (steps + 1,)
 
 
 def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
@@ -101,9 +101,8 @@ def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
         bind(policy, stage.scenario, Seeds(stage.seed))
     for policy in tqdm(wanted, disable=None, file=sys.stderr, unit="policy"):
         made = baselines.track(stage.scenario, policy, seed=stage.seed)
-        position = np.append(stage.errors[0], made.position_error)
-        orientation = np.append(stage.errors[1], made.orientation_error)
+        steps = np.maximum(np.arange(stage.scenario.steps + 1) - 1, 0)
+        errors = made.position_error[steps], made.orientation_error[steps]
         cost = np.append(0.0, np.cumsum(made.cost))
-        statuses = np.append(made.statuses[:1], made.statuses)
-        replays.append(Replay(policy, made.motion.q, position, orientation, cost, statuses))
+        replays.append(Replay(policy, made.motion.q, *errors, cost, made.statuses[steps]))
     return replays

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import queue
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -65,10 +64,11 @@ class Viewer:
         self._on_user(self.joints, lambda *q: session.place(np.array(q)))
         self._since_reading = 0.0
 
-    def run(self, stop: threading.Event) -> None:
-        """Updates the scene until the event is set."""
+    def run(self) -> None:
+        """Updates the scene until Ctrl-C."""
         before = time.perf_counter()
-        while not stop.wait(max(0.0, before + 1.0 / PICTURES - time.perf_counter())):
+        while True:
+            time.sleep(max(0.0, before + 1.0 / PICTURES - time.perf_counter()))
             now = time.perf_counter()
             self.tick(now - before)
             before = now

@@ -158,7 +158,7 @@ class Session:
             q, status = self._q[number], PLAYS_ONLY
         else:
             q, status = following.q, following.status
-            position, orientation = following.errors(self._approach)
+            position, orientation = self.stage.errors(q, self.reference)
         scenario = self.stage.scenario
         pair = closest(scenario.arm, q[None], self.obstacles[None], scenario.surroundings.checked)
         errors = float(position), float(orientation)

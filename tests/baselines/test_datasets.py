@@ -1,9 +1,6 @@
-"""Data sets of Minari: the environment plays them again bit for bit, and a killed process is resumed."""
+"""Data sets of Minari, which the environment plays again bit for bit."""
 
 import pathlib
-import subprocess
-import sys
-import time
 
 import gymnasium as gym
 import numpy as np
@@ -13,14 +10,12 @@ pytest.importorskip("minari", reason='needs Minari: pip install "ikgym[data]"')
 
 import minari
 
-from baselines import datasets
 from baselines.cli.commands.dataset import main
 from baselines.datasets import write
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
 from ikgym import scenarios
 
-ROOT = pathlib.Path(__file__).parents[2]
 SHORT = scenarios.get("varga7-random").replace(name="short", steps=40)
 GIVEN = {"scenario": SHORT, "policy": "dls:damping=1e-2", "episodes": 3}
 
@@ -42,12 +37,6 @@ def equal(one, other):
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
     return np.asarray(one).tobytes() == np.asarray(other).tobytes()
-
-
-def same(folder, other):
-    parts = ("observations", "actions", "rewards", "terminations", "truncations", "infos")
-    pairs = zip(contents(folder)[0], contents(other)[0], strict=True)
-    return all(equal(getattr(a, part), getattr(b, part)) for a, b in pairs for part in parts)
 
 
 def test_the_environment_plays_it_again_bit_for_bit(written):
@@ -90,68 +79,22 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     seen, _ = data.recover_environment().reset(seed=scenarios.SPLITS["validation"].start)
     assert equal(seen, {key: values[0] for key, values in data[0].observations.items()})
     assert seen["nominal"].shape == (3, 6)
-    assert sorted(file.name for file in (tmp_path / "sets" / "dls-v1").iterdir()) == ["data", "dataset.json"]
+    assert [file.name for file in (tmp_path / "sets" / "dls-v1").iterdir()] == ["data"]
 
 
-@pytest.mark.slow
-def test_a_killed_process_is_resumed(tmp_path):
-    killed, whole = tmp_path / "killed-v0", tmp_path / "whole-v0"
-    arguments = ["--scenario", "varga7-random", "--policy", "dls", "--episodes", "40", "--resume", "--out"]
-    line = [sys.executable, "-m", "baselines.cli", "dataset", *arguments, str(killed)]
-    process = subprocess.Popen(line, cwd=ROOT, stderr=subprocess.DEVNULL)
-    while process.poll() is None and not list(killed.glob("blocks/*")):
-        time.sleep(0.001)
-    process.kill()
-    assert process.wait() < 0
-    assert not (killed / "data").exists()
-    assert main([*arguments, str(killed)]) == main([*arguments, str(whole)]) == 0
-    assert same(killed, whole)
-    assert sorted(file.name for file in killed.iterdir()) == ["data", "dataset.json"]
-
-
-def test_a_block_that_is_written_is_not_played_again(tmp_path, monkeypatch, written):
-    monkeypatch.setattr(datasets, "BLOCK", 1)
-    played, real = [], datasets._record
-
-    def record(jobs, folder):
-        played.append(jobs[0].seeds.seed)
-        if len(played) == 3:
-            raise KeyboardInterrupt
-        real(jobs, folder)
-
-    monkeypatch.setattr(datasets, "_record", record)
-    with pytest.raises(KeyboardInterrupt):
-        write(**GIVEN, out=tmp_path / "dls-v0")
-    assert not (tmp_path / "dls-v0" / "data").exists()
-    write(**GIVEN, out=tmp_path / "dls-v0", resume=True)
-    assert played == [0, 1, 2, 2]
-    assert same(tmp_path / "dls-v0", written)
-
-
-def test_a_damaged_block_is_refused(tmp_path, monkeypatch):
-    real = datasets._record
-
-    def record(jobs, folder):
-        real(jobs, folder)
-        (folder / "main_data.hdf5").write_bytes(b"nothing")
-
-    monkeypatch.setattr(datasets, "_record", record)
-    with pytest.raises(ResultsError, match="000000: Unable to"):
-        write(**GIVEN, out=tmp_path / "dls-v0")
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({}, "already exists: continue with --resume"),
-        ({"resume": True, "policy": "moore_penrose"}, r"policy \('dls' there, 'moore_penrose' here\)"),
-        ({"resume": True, "episodes": 4}, r"episodes \(3 there, 4 here\)"),
-        ({"resume": True, "split": "validation"}, "split"),
-    ],
-)
-def test_another_data_set_in_the_folder(written, changes, message):
-    with pytest.raises(ResultsError, match=message):
-        write(**GIVEN | changes, out=written)
+def test_a_run_that_breaks_off_leaves_the_data_set_of_before(tmp_path, monkeypatch):
+    folder = tmp_path / "dls-v0"
+    write(**GIVEN | {"episodes": 1}, out=folder)
+    with pytest.raises(ResultsError, match="already exists: replace it with --overwrite"):
+        write(**GIVEN, out=folder)
+    with monkeypatch.context() as broken:
+        broken.setattr("baselines.datasets.add_up", lambda costs: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            write(**GIVEN, out=folder, overwrite=True)
+    assert len(contents(folder)[0]) == 1
+    write(**GIVEN, out=folder, overwrite=True)
+    assert len(contents(folder)[0]) == 3
+    assert sorted(file.name for file in folder.iterdir()) == ["data", "scenario.toml"]
 
 
 @pytest.mark.parametrize(

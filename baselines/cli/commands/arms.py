@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.cli import shell
+from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions
 from baselines.cli.parsing import Rule
-from baselines.cli.robot import ROBOT_OPTIONS, RobotOptions
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
 from ikgym.scenarios import toml
@@ -26,14 +26,6 @@ class Arguments(shell.Names, RobotOptions):
 
 
 RULES = (Rule(ROBOT_OPTIONS, lambda given: any(_is_urdf(name) for name in given.names), "without a URDF file"),)
-
-
-def main(arguments: Sequence[str]) -> int:
-    """The command line: names, or options; returns the exit code."""
-    given = shell.members("arms", ARMS, arguments, Arguments, RULES)
-    if given.names:
-        print("\n\n".join(_shown(name, given) for name in given.names))
-    return 0
 
 
 def _is_urdf(name: str) -> bool:
@@ -133,6 +125,13 @@ def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> s
     return f"{head}\n\n{toml.document({'arm': table}).strip()}"
 
 
-ARMS = shell.Catalogue(
-    "arm", arms.names, ("arm", "joints", "prismatic", "limits"), _arm_row, endings=(".urdf", ".toml")
+main = shell.listed(
+    "arms",
+    "arm",
+    arms.names,
+    (("joints", "prismatic", "limits"), _arm_row),
+    _shown,
+    endings=(".urdf", ".toml"),
+    options=Arguments,
+    rules=RULES,
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
@@ -29,8 +28,6 @@ class Options:
     """Seeds of random scenarios: train, validation or test. Scores of agents that learn from test are void."""
     preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None
     """Steps ahead that the policy is shown; its own preview if left out."""
-    resume: bool = False
-    """Continue with the data set in the folder."""
     overwrite: bool = False
     """Replace the data set in the folder."""
 
@@ -53,14 +50,12 @@ In Python, with MINARI_DATASETS_PATH=datasets:
 DIR/data appears in one go when all episodes are written."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    return shell.run_resumable(Options, arguments, "ikgym dataset", manual, _work, RULES)
-
-
 def _work(options: Options, _: str) -> None:
     from baselines import datasets  # imports Minari, an extra
 
     datasets.write(**{field.name: getattr(options, field.name) for field in dataclasses.fields(options)}, progress=True)
     name = options.out.absolute().name
     print(f'{options.out}: MINARI_DATASETS_PATH={options.out.parent}, minari.load_dataset("{name}")')
+
+
+main = shell.Command("dataset", Options, manual, _work, RULES)

@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, ClassVar
 
 import tyro
@@ -114,12 +114,6 @@ def _columns() -> str:
     return re.sub(r", see :\w+:`[^`]+`", "", text).replace("None", "null")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    program = shell.program("evaluate", "python -m baselines.evaluate")
-    return shell.run_resumable(Arguments, arguments, program, manual, _work, RULES)
-
-
 def cut_off(played: Iterable[Scenario]) -> list[str]:
     """Warnings of paths whose end is not played."""
     return [
@@ -140,3 +134,6 @@ def _work(given: Arguments, command: str) -> None:
     )
     if given.out is not None:
         print(f"\nwritten to {given.out}" + (f"; open {given.out / PAGE} in a browser" if given.report else ""))
+
+
+main = shell.Command("evaluate", Arguments, manual, _work, RULES, shell.RESUMED, "baselines.evaluate")

@@ -71,11 +71,6 @@ def compare(rows: Rows, policies: Sequence[str], out: pathlib.Path) -> str:
     return text
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    return shell.run_resumable(Options, arguments, "ikgym leaderboard", manual, _work, RULES)
-
-
 def _work(given: Options, command: str) -> None:
     if given.scenarios and given.test_sets:
         raise InvalidInputError("expected --test-sets or --scenarios; got both.")
@@ -84,3 +79,6 @@ def _work(given: Options, command: str) -> None:
     for one in rows.skipped:
         print(f"skipped: {one.policy} in {one.scenario}: {one.reason}")
     print(f"\nwritten to {given.out}")
+
+
+main = shell.Command("leaderboard", Options, manual, _work, RULES, shell.RESUMED)

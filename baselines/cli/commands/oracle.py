@@ -7,20 +7,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Annotated
 
-import numpy as np
 import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, parse
+from baselines.cli.parsing import Rule
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
-from baselines.oracle.best_known import MARGIN, MEANINGLESS
 from baselines.oracle.cache import VARIABLE
-from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.several import Wanted, check_policies, find_all
-from baselines.oracle.stripped import NOTE, stripped, strips
+from baselines.oracle.stripped import NOTE, strips
 from baselines.recording import Seeds
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
@@ -52,9 +49,6 @@ class Options:
     """Save optima that are better than the records, or have no record."""
     cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Search on a cluster: ray, at the address in RAY_ADDRESS, a core for each episode."""
-    check: bool = False
-    """Compare the records with the optima, which are played again; the exit code is 1 if a record is missing, stale or
-    off by more than a millionth."""
 
 
 RULES = (
@@ -67,9 +61,8 @@ RULES = (
 )
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = "ikgym oracle"
     return f"""\
 Searches the cheapest joint paths of whole episodes from many starts, and keeps their costs as records:
 cost ratio = cost / best known cost. A record is not proven to be the minimum.
@@ -83,7 +76,6 @@ Examples:
   {prog} --scenarios varga7-random --seeds 1000000 1000001 --starts 1000
   {prog} --update
   {prog} --scenarios varga7-fast --policies rhc_foresight --update
-  {prog} --test-sets varga7-pose-random --check
   {prog} --test-sets panda-clutter-random --policies rhc_foresight --starts 10 --generations 0 --polished 1
 
 Among bodies, paths of policies replace the receding horizons that the search has of its own, and the roll-out.
@@ -131,7 +123,7 @@ def _drawn(scenario: Scenario) -> bool:
 
 def optima(
     todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool, workers: Workers = ALONE
-) -> Iterator[tuple[Scenario, Seeds, Optimum]]:
+) -> Iterator[tuple[Scenario, Optimum]]:
     """Searches episodes, with a bar on stderr, and yields each as soon as it is done."""
     wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
     check_policies(wanted)
@@ -153,7 +145,7 @@ def optima(
             done += 1
             bar.update(done - bar.n)
             bar.clear()
-            yield one.scenario, one.draw, optimum
+            yield one.scenario, optimum
 
 
 def line(optimum: Optimum, note: str = "") -> str:
@@ -172,40 +164,15 @@ def line(optimum: Optimum, note: str = "") -> str:
     return "; ".join([*parts, f"{optimum.seconds:.2f} s a path"])
 
 
-def verdict(scenario: Scenario, optimum: Optimum, arm_seed: int | None = None) -> str | None:
-    """The error of the record of an episode, compared with an optimum that is played again; None if there is none."""
-    known = best_known.lookup(scenario, optimum.seed, arm_seed)
-    if known is None:
-        return "no record of this content"
-    _, cost = EpisodeProblem.of(stripped(scenario, optimum.seed, arm_seed), optimum.seed).play(optimum.qdot)
-    if max(known.cost, cost) <= MEANINGLESS:
-        return None
-    ratio = np.inf if known.cost == 0.0 else cost / known.cost
-    if ratio < 1.0 - MARGIN:
-        return f"the record, {known.cost:.10g}, is too high: {ratio:.7f} of it was found"
-    if ratio > 1.0 + MARGIN:
-        return f"the record, {known.cost:.10g}, was not reached: {ratio:.7f} of it was found"
-    return None
-
-
-def main(arguments: Sequence[str]) -> int:
-    """The command line: words after the command; returns the exit code, 1 if a record fails the check."""
-    return shell.run(lambda: _carry_out(arguments), lambda: "Stopped. Optima that were found are kept.")
-
-
-def _carry_out(arguments: Sequence[str]) -> int:
-    options = parse(Options, arguments, prog="ikgym oracle", description=manual(), rules=RULES)
-    kept, wrong = 0, 0
-    todo = episodes(options.scenarios, options.test_sets, options.seeds)
+def _work(options: Options, _: str) -> None:
+    kept, todo = 0, episodes(options.scenarios, options.test_sets, options.seeds)
     workers = Workers(cluster=options.cluster)
-    solved = optima(todo, options.search, options.policies, cache=options.cache, workers=workers)
-    for scenario, draw, optimum in solved:
+    for scenario, optimum in optima(todo, options.search, options.policies, cache=options.cache, workers=workers):
         print(line(optimum, NOTE if strips(scenario) else ""), flush=True)
-        if options.check and (reason := verdict(scenario, optimum, draw.arm_seed)):
-            print(f"  {reason}", flush=True)
-            wrong += 1
         if options.update:
             kept += len(best_known.record([optimum.record()]))
     if options.update:
         print(f"{kept} of {len(todo)} records are new or better: {best_known.DATA.name}")
-    return 1 if wrong else 0
+
+
+main = shell.Command("oracle", Options, manual, _work, RULES, "Optima that were found are kept.")

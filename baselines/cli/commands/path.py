@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,10 +11,9 @@ import tyro
 
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, scenario_of
-from baselines.cli.parsing import parse
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.retiming import refusal, retimed
-from baselines.paths.speeds import Speeds, speed_limit
+from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
@@ -23,7 +21,6 @@ from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
 from ikgym.validation import BoolArray, FloatArray, whole_number
 
-PROGRAM = f"{shell.CONSOLE} path"
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
 
@@ -44,7 +41,7 @@ class Options(OwnPath):
     """Whether bodies count. They do where there are obstacles, and with a CSV file if the arm has bodies."""
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Says whether an arm can drive a path, from which start and how fast: qp plays it from several postures at the first
@@ -52,14 +49,12 @@ pose, and toppra finds the shortest time in which the limits hold. Where the arm
 and of obstacles. Needs pip install "ikgym[paths]".
 
 Examples:
-  {PROGRAM} weld.toml --retime weld-retimed.toml
-  {PROGRAM} weld.csv --arm arm.urdf --tip tool0 --speed 0.2 --acceleration 5
-  {PROGRAM} weld.csv --arm panda --speed 0.2 --obstacles cell.toml"""
+  {prog} weld.toml --retime weld-retimed.toml
+  {prog} weld.csv --arm arm.urdf --tip tool0 --speed 0.2 --acceleration 5
+  {prog} weld.csv --arm panda --speed 0.2 --obstacles cell.toml"""
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: a file, or the name of a scenario, and options; returns the exit code."""
-    options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
+def _work(options: Options, _: str) -> None:
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
     every = found = survey(_scenario(options))
@@ -73,7 +68,6 @@ def main(arguments: Sequence[str]) -> int:
             raise InvalidInputError(f"--retime: the path cannot be driven, {options.retime} is not written.")
         driven.scenario.save(options.retime)
         print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
-    return 0
 
 
 def _scenario(options: Options) -> Scenario:
@@ -97,14 +91,14 @@ def _head(found: Survey) -> list[str]:
 
 def _tool(scenario: Scenario) -> list[str]:
     """The tool at the first pose, and its speeds."""
-    frame, speeds = scenario.frames(scenario.trajectory, 1)[0], Speeds.of(scenario)
+    frame, (linear, angular) = scenario.frames(scenario.trajectory, 1)[0], fastest(scenario)
     begins = f"  begins at ({shell.numbers(frame[-3:])}) m"
     if len(frame) == 12:
         begins += f", the tool's z axis along ({shell.numbers(frame[2:9:3])})"
     limit = speed_limit(scenario.trajectory)
     asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
-    turning = f", the tool turns by {speeds.angular:.3g} rad/s" if speeds.angular > 1e-6 else ""
-    lines = [begins, f"  fastest {speeds.linear:.3g} m/s{asked}{turning}"]
+    turning = f", the tool turns by {angular:.3g} rad/s" if angular > 1e-6 else ""
+    lines = [begins, f"  fastest {linear:.3g} m/s{asked}{turning}"]
     if _unstated(scenario.arm).any():
         lines.append("  acceleration limits are not stated (see --acceleration): velocities alone are checked")
     if scenario.cut_off:
@@ -171,7 +165,7 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
         how += " (no closer: a stop or a singularity is near)"
     can = "It can be driven as it is"
     if driven.duration != found.duration:
-        speed = f"in {driven.duration:.3g} s, at up to {Speeds.of(driven.scenario).linear:.3g} m/s"
+        speed = f"in {driven.duration:.3g} s, at up to {fastest(driven.scenario)[0]:.3g} m/s"
         as_asked = found.drivable_within(REACHED)
         can = f"{can}, and {speed}" if as_asked else f"It cannot be driven in {found.duration:.3g} s, but {speed}"
     hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
@@ -191,3 +185,6 @@ def _peak(driven: Retimed) -> str:
     peaks = np.abs(np.diff(steps, axis=0)).max(axis=0) / motion.times[1] ** 2
     joint = int(np.argmax(np.where(_unstated(arm), peaks, 0.0)))
     return f"accelerations come to {peaks[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
+
+
+main = shell.Command("path", Options, manual, _work, RULES)

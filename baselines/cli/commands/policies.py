@@ -5,15 +5,9 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Sequence
 
 from baselines import registry
 from baselines.cli import shell
-
-
-def main(arguments: Sequence[str]) -> int:
-    """The command line: names, or options; returns the exit code."""
-    return shell.list_members("policies", POLICIES, arguments)
 
 
 def _policy_row(name: str) -> tuple[str, ...]:
@@ -25,7 +19,7 @@ def summary(name: str) -> str:
     return " ".join(_plain(registry.get(name).__doc__ or "").split("\n\n")[0].split())
 
 
-def _policy(name: str) -> str:
+def _policy(name: str, _: shell.Names) -> str:
     policy = registry.get(name)
     fields = policy.__dataclass_fields__
     given = [(p, fields[p].default, fields[p].default_factory) for p in policy.parameter_names()]
@@ -43,4 +37,4 @@ def _plain(text: str) -> str:
     return text.replace("``", "`")
 
 
-POLICIES = shell.Catalogue("policy", registry.names, ("policy", "what it does"), _policy_row, _policy)
+main = shell.listed("policies", "policy", registry.names, (("what it does",), _policy_row), _policy)

@@ -11,14 +11,13 @@ import dataclasses
 import json
 import pathlib
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Annotated
 
 import tyro
 
 from baselines.canonical import jsonable
 from baselines.cli import shell
-from baselines.cli.parsing import parse
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.evaluation.records import to_csv
@@ -28,8 +27,6 @@ from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import whole_number
-
-PROGRAM = f"{shell.CONSOLE} reproduce"
 
 #: The results of testing claims, by paper and claim.
 Findings = dict[str, dict[str, Finding]]
@@ -118,9 +115,8 @@ class Options:
     """Most steps of an episode, for trials, whose findings mean nothing."""
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = PROGRAM
     return f"""\
 Regenerates the experiments of the papers: draws every figure again and tests every claim.
 
@@ -135,17 +131,13 @@ Files in the folder of --out:
   papers.md            the same as tables, with how each claim was tested"""
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: words after the command; returns the exit code."""
-    return shell.run(lambda: _carry_out(arguments))
-
-
-def _carry_out(arguments: Sequence[str]) -> int:
-    options = parse(Options, arguments, prog=PROGRAM, description=manual())
+def _work(options: Options, _: str) -> None:
     findings = reproduce(
         options.paper, figures=options.figure or None, out=options.out, steps=options.steps, progress=True
     )
     for row in ledger.rows(findings):
         print(f"{row['paper']:8} {row['verdict']:13} {row['claim']}: {row['figures']}")
     print(f"\nwritten to {options.out}")
-    return 0
+
+
+main = shell.Command("reproduce", Options, manual, _work)

@@ -100,11 +100,6 @@ def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
     ]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    return shell.run_resumable(Options, arguments, "ikgym robustness", manual, _work, RULES)
-
-
 def _work(options: Options, command: str) -> None:
     del command
     severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
@@ -141,3 +136,6 @@ def _write(out: pathlib.Path, lines: Sequence[records.Record]) -> None:
     write(out / "map.md", f"{text}\n".encode())
     write(out / "map.png", png(severity_map(lines)))
     print(text)
+
+
+main = shell.Command("robustness", Options, manual, _work, RULES, shell.RESUMED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import textwrap
 
 import numpy as np
 
@@ -13,21 +13,18 @@ from ikgym.arms import Arm
 from ikgym.scenarios import Scenario, durations
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: names, or options; returns the exit code."""
-    return shell.list_members("scenarios", SCENARIOS, arguments)
-
-
 def _scenario_row(name: str) -> tuple[str, ...]:
     scenario = scenarios.get(name)
     return scenario.arm.name, scenario.task.name, f"{scenario.steps}", scenario.source
 
 
-def _scenario(name: str) -> str:
+def _scenario(name: str, _: shell.Names) -> str:
     scenario = scenarios.find(name)
     lines = [f"{scenario.name}: {scenario.steps} steps of {scenario.dt:g} s", ""]
-    lines += [scenario.source, ""] if scenario.source else []
-    return "\n".join([*lines, *(f"  {key:16} {value}" for key, value in _parts(scenario).items())])
+    lines += [textwrap.fill(scenario.source, shell.width()), ""] if scenario.source else []
+    for key, value in _parts(scenario).items():
+        lines.append(textwrap.fill(f"  {key:16} {value}", shell.width(), subsequent_indent=19 * " "))
+    return "\n".join(lines)
 
 
 def _parts(scenario: Scenario) -> dict[str, object]:
@@ -93,11 +90,11 @@ def _reach(scenario: Scenario) -> str:
     return f"not all: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
 
 
-SCENARIOS = shell.Catalogue(
+main = shell.listed(
+    "scenarios",
     "scenario",
     lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),
-    ("scenario", "arm", "task", "steps", "source"),
-    _scenario_row,
+    (("arm", "task", "steps", "source"), _scenario_row),
     _scenario,
-    (".toml",),
+    endings=(".toml",),
 )

@@ -10,7 +10,7 @@ import itertools
 import pathlib
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Generic, TypeVar, Union
 
 import tyro
@@ -24,7 +24,7 @@ from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, train_seeds
 from baselines.workers import Workers
 from ikgym import rl, scenarios
-from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
@@ -66,14 +66,6 @@ class ByRewards(Generic[C]):
     """Folder of the runs; that with seed N has the folder seed-N in it."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Repeat(RunOptions):
-    """Repeats a run from its run.json and compares the final weights; exit code 1 where they differ."""
-
-    run: Annotated[tyro.conf.Positional[pathlib.Path], tyro.conf.arg(metavar="RUN_JSON")]
-    """The run.json of a run."""
-
-
 RULES = (
     Rule(("--workers",), lambda given: given.options.cluster is None, "with --cluster"),
     Rule(("--workers",), lambda given: len(set(given.options.seeds)) > 1 or given.options.workers < 2, "on one seed"),
@@ -108,7 +100,6 @@ Examples:
   {prog} apg --preset quick --out runs/apg
   {prog} apg --preset standard --seeds 0 1 2 --workers 2 --out runs/apg
   {prog} apg --preset quick --out runs/apg --resume
-  {prog} repeat runs/apg/seed-0/run.json --out runs/again
   {prog} ppo --env ikgym/Track-v0 --minutes 10 --seeds 0 1 2 --out runs/track-ppo
   {prog} sac --env ikgym/Reach-v0 --total-timesteps 100000 --out runs/reach-sac
 
@@ -119,7 +110,7 @@ Files of a run by rewards, all but apg, in seed-N:
   run.json           at the end: settings, seed and final score
 
 Files of a run of apg, which may be killed at any time:
-  run.json           options, seed, versions, validations, computing time, hash of the final weights
+  run.json           command, seed, versions, validations, computing time, hash of the final weights
   history.json       a row for each segment
   tensorboard/       the same, for: tensorboard --logdir DIR
   checkpoint.pt      the state, for --resume
@@ -130,26 +121,19 @@ used. The cost ratio is stated where the best known costs of all validation epis
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The command line: words after the command; returns the exit code, 1 if a repetition ends with other weights."""
-    out: pathlib.Path | None = None
+    """The command line: words after the command; returns the exit code."""
+    stopped = "Stopped."
 
     def work() -> int:
-        nonlocal out
+        nonlocal stopped
         command = parse(arguments)
         _require_extra()
-        if isinstance(command, Repeat):
-            out = command.out
-            return _repeat(command)
         if isinstance(command, ByRewards):
             return _train_by_rewards(command)
-        out = command.options.out
+        stopped = f"Stopped. The last checkpoint is in {command.options.out}; continue with --resume."
         return _train(command, shlex.join([*_program().split(), *arguments]))
 
-    def stopped() -> str:
-        kept = "" if out is None else f" The last checkpoint is in {out}; continue with --resume."
-        return f"Stopped.{kept}"
-
-    return shell.run(work, stopped)
+    return shell.run(work, lambda: stopped)
 
 
 def _program() -> str:
@@ -158,33 +142,28 @@ def _program() -> str:
 
 def _require_extra() -> None:
     """Checks for the packages that only training needs."""
-    missing = [
-        name
-        for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard")
-        if importlib.util.find_spec(name) is None
-    ]
-    if missing:
-        raise MissingDependencyError(f'Training needs {", ".join(missing)}: pip install "ikgym[train]"')
+    for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard"):
+        if importlib.util.find_spec(name) is None:
+            raise ModuleNotFoundError(name=name)
 
 
-def parse(arguments: Sequence[str]) -> Command | ByRewards[Any] | Repeat:
+def parse(arguments: Sequence[str]) -> Command | ByRewards[Any]:
     """The command in a command line."""
     if not arguments:
         with contextlib.suppress(SystemExit):
             parse(["--help"])
     chosen = arguments[0] if arguments else "none"
     if not arguments or (chosen.startswith("-") and chosen not in ("-h", "--help")):
-        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}, or repeat; got {chosen}.")
+        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}; got {chosen}.")
     if not chosen.startswith("-"):
-        known_name("method", chosen, (*methods.METHODS, "repeat"))
+        known_name("method", chosen, methods.METHODS)
     by_rewards = chosen in methods.METHODS and chosen != APG.method
     if by_rewards and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in arguments}:
         raise InvalidInputError(f"{chosen} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
     preset = _value_of("--preset", arguments) if chosen == APG.method else None
     kinds = [_subcommand(kind, preset) for kind in methods.METHODS.values()]
-    kinds.append(Annotated[Repeat, tyro.conf.subcommand("repeat")])
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command | ByRewards[Any] | Repeat = parse_options(
+    command: Command | ByRewards[Any] = parse_options(
         any_of_them, arguments, prog=_program(), description=manual(), rules=RULES
     )
     return command
@@ -241,33 +220,6 @@ def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
     if not checked:
         raise TrainingError("seeds: expected at least one.")
     return checked
-
-
-def _repeat(command: Repeat) -> int:
-    about = read_run(command.run)
-    wanted = about.get("weights_sha256")
-    if not wanted:
-        raise TrainingError(f"{command.run} belongs to a run that has not ended: finish it with --resume.")
-    config = APG.from_json(about["config"])
-    seed, text = whole_number("seed", about["seed"], at_least=0), [*_program().split(), "repeat", str(command.run)]
-    (error,) = train_seeds(config, command, [seed], command=shlex.join(text)).values()
-    if error:
-        raise TrainingError(error)
-    again = read_run(command.folder(seed) / "run.json")
-    if again["weights_sha256"] == wanted:
-        print(f"The same final weights, bit for bit: {wanted}")
-        return 0
-    print(f"Other final weights: expected {wanted}, got {again['weights_sha256']}.")
-    for line in _reasons(about, again):
-        print(line)
-    return 1
-
-
-def _reasons(there: dict[str, Any], here: dict[str, Any]) -> Iterable[str]:
-    """Differences that may have led to other weights."""
-    for part in ("scenario", "versions", "machine"):
-        if there.get(part) != here.get(part):
-            yield f"  {part}: {there.get(part)} there, {here.get(part)} here"
 
 
 def table(errors: Mapping[int, str], options: RunOptions) -> str:

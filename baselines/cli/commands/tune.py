@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
-from collections.abc import Sequence
 from typing import Annotated
 
 import tyro
@@ -57,11 +56,6 @@ Files:
   DIR/tuned.json      the best settings"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line: words after the command, or those of the process; returns the exit code."""
-    return shell.run_resumable(Options, arguments, "ikgym tune", manual, _work)
-
-
 def _work(options: Options, text: str) -> None:
     from baselines import tuning  # imports Optuna, an extra
 
@@ -78,3 +72,6 @@ def _work(options: Options, text: str) -> None:
         ratio = one["tuned"] / one["default"]
         print(f"{one['spec']}: {ratio:.4g} times the cost of its defaults, {one['tried']} tried: {one['settings']}")
     print(f"\nwritten to {options.out}")
+
+
+main = shell.Command("tune", Options, manual, _work, kept=shell.RESUMED)

@@ -5,20 +5,22 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 import sys
-from collections.abc import Sequence
-from typing import Annotated
+import tempfile
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
 
+import numpy as np
+import numpy.typing as npt
 import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.parsing import if_random, parse
-from baselines.files import check_writable
-from baselines.viewer.film import check_ffmpeg, checked_width, moments, pictures, write_video
-from baselines.viewer.replay import Stage, play_all
-from ikgym.exceptions import InvalidInputError
-
-PROGRAM = f"{shell.CONSOLE} video"
+from baselines.cli.parsing import if_random
+from baselines.files import ResultsError, check_writable, write
+from baselines.viewer.replay import Replay, Stage, play_all
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.rendering import Renderer
+from ikgym.validation import number, whole_number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,9 +48,8 @@ class Options:
 RULES = (if_random("--seed"),)
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = PROGRAM
     return f"""\
 Draws an episode as an H.264 video: the arm, the paths and the errors over time, several policies at the same time.
 Needs pip install "ikgym[video]".
@@ -58,27 +59,60 @@ Examples:
   {prog} --scenario varga7-fast --policy dls rhc rhc_foresight --speed 0.2 --width 1280 --out talk.mp4"""
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The command line: words after the command; returns the exit code."""
-    return shell.run(lambda: _film(parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)))
-
-
-def _film(options: Options) -> int:
-    check_ffmpeg()  # before episodes are played
+def _work(options: Options, _: str) -> None:
+    try:
+        from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter  # an extra
+    except RuntimeError as e:
+        raise MissingDependencyError(f"Videos need the program ffmpeg: {e}") from None
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
-    width = checked_width(options.width)
+    width, fps = whole_number("width", options.width, at_least=480, at_most=3840), options.fps
+    if width % 4:  # a video has even sizes, and pictures are half as high as wide
+        raise InvalidInputError(f"width: expected a multiple of 4 in [px], got {width}.")
+    between = number("speed", options.speed, above=0.0) / number("fps", fps, at_least=0.1, at_most=1000.0)
     stage = Stage.of(options.scenario, options.seed, options.steps)
-    steps = moments(stage, options.fps, options.speed)
     check_writable(options.out.absolute().parent)
-    replays = play_all(stage, options.policy)
-    content = tqdm(
-        pictures(stage, replays, steps, width=width),
-        total=len(steps),
-        unit="picture",
-        file=sys.stderr,
-        dynamic_ncols=True,
-    )
-    write_video(options.out, content, options.fps)
-    print(f"{options.out}: {len(steps)} pictures, {len(steps) / options.fps:.1f} s")
-    return 0
+    replays, last = play_all(stage, options.policy), stage.scenario.steps
+    steps = np.append(np.rint(np.arange(0.0, last, between / stage.scenario.dt)), last).astype(np.int64)
+    across = min(len(replays), 2)
+    size = across * width, -(-len(replays) // across) * width // 2
+    with tempfile.TemporaryDirectory() as folder:
+        draft = pathlib.Path(folder) / "draft.mp4"
+        try:
+            with FFMPEG_VideoWriter(str(draft), size, fps, codec="libx264", preset="medium") as video:
+                for picture in tqdm(pictures(stage, replays, steps, width), total=len(steps), file=sys.stderr):
+                    video.write_frame(picture)
+            written = draft.read_bytes()
+        except OSError as e:
+            raise ResultsError(f"Cannot write {options.out}: ffmpeg has failed ({e}).") from None
+    write(options.out, written)
+    print(f"{options.out}: {len(steps)} pictures, {len(steps) / fps:.1f} s")
+
+
+def pictures(
+    stage: Stage, replays: Sequence[Replay], steps: npt.NDArray[np.int64], width: int
+) -> Iterator[npt.NDArray[np.uint8]]:
+    """Draws an episode at some steps; the picture of each policy has a width in [px].
+
+    Yields:
+        Pictures with the policies in two columns, row by row, white where one is missing. Shape (height, width, 3).
+    """
+    scenario, across, known = stage.scenario, min(len(replays), 2), 0
+    look: dict[str, Any] = {"has_orientation": scenario.task.has_orientation, "surroundings": stage.around}
+    renderers = []
+    for replay in replays:
+        title = f"{scenario.name}: {replay.policy}"
+        renderers.append(Renderer(scenario.arm, "rgb_array", title=title, width=width, **look))
+        renderers[-1].begin(stage.frames[:, 9:], scenario.steps * scenario.dt)
+    for step in steps.tolist():
+        for renderer, replay in zip(renderers, replays, strict=True):
+            for k in range(known, step + 1):
+                errors = replay.position_error[k], replay.orientation_error[k]
+                renderer.add(replay.q[k], *errors, k * scenario.dt, stage.obstacles(k))
+        known = step + 1
+        tiles: list[Any] = [renderer.draw() for renderer in renderers]
+        tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % across)
+        yield np.vstack([np.hstack(tiles[k : k + across]) for k in range(0, len(tiles), across)])
+
+
+main = shell.Command("video", Options, manual, _work, RULES)

@@ -5,20 +5,16 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 import sys
-import threading
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import if_random, parse
+from baselines.cli.parsing import if_random
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-
-PROGRAM = f"{shell.CONSOLE} view"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,9 +40,8 @@ class Options:
 RULES = (if_random("--seed"),)
 
 
-def manual() -> str:
+def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
-    prog = PROGRAM
     return f"""\
 Shows policies side by side in a browser: a replay of the episode at any speed, and arms that follow a target that you
 drag, each with its own policy, without the imperfections of the scenario's plant. Sliders move the joints within their
@@ -58,25 +53,18 @@ Examples:
   {prog} --scenario lab.toml --policy qp --urdf lab.urdf"""
 
 
-def main(arguments: Sequence[str], stop: threading.Event | None = None) -> int:
-    """The command line: words after the command; runs until Ctrl-C or `stop`, and returns the exit code."""
+def _work(options: Options, _: str) -> None:
+    # Before episodes are played: extras may be missing, or the port taken.
+    from baselines.viewer.server import Viewer, free_port, serving
 
-    def work() -> int:
-        options = parse(Options, arguments, prog=PROGRAM, description=manual(), rules=RULES)
-        # Before episodes are played: extras may be missing, or the port taken.
-        from baselines.viewer.server import Viewer, free_port, serving
-
-        port = free_port(options.host, options.port)
-        stage = Stage.of(options.scenario, options.seed, options.steps)
-        shapes = meshes(stage.scenario.arm, options.urdf)
-        session = Session(stage, options.policy)
-        with serving(options.host, port) as server:
-            viewer = Viewer(server, session, shapes)
-            print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
-            viewer.run(threading.Event() if stop is None else stop)
-        return 0
-
-    return shell.run(work)
+    port = free_port(options.host, options.port)
+    stage = Stage.of(options.scenario, options.seed, options.steps)
+    shapes = meshes(stage.scenario.arm, options.urdf)
+    session = Session(stage, options.policy)
+    with serving(options.host, port) as server:
+        viewer = Viewer(server, session, shapes)
+        print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)
+        viewer.run()
 
 
 def meshes(arm: Arm, file: pathlib.Path | None) -> Any:
@@ -93,3 +81,6 @@ def meshes(arm: Arm, file: pathlib.Path | None) -> Any:
             raise
         print(f"Cylinders are shown: {e}", file=sys.stderr)
         return None
+
+
+main = shell.Command("view", Options, manual, _work, RULES)

@@ -62,9 +62,9 @@ def test_help_of_each_command(word, capsys):
         (["evaluate", "--steps", "few"], "Error parsing --steps: expected INT, got 'few'. See ikgym evaluate --help."),
         (
             ["train", "pop", "--out", "x"],
-            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3, recurrent_ppo,",
+            "no method 'pop'. Did you mean 'ppo'? Available: apg, ppo, sac, td3, recurrent_ppo.",
         ),
-        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, recurrent_ppo, or repeat; got --out."),
+        (["train", "--out", "x"], "expected a method, one of apg, ppo, sac, td3, recurrent_ppo; got --out."),
         (["train", "ppo", "--env", "ikgym/Track-v0"], "Missing from ikgym train ppo: --out."),
         (["train", "ppo", "--out", "x"], "ppo needs an environment: expected --env, one of ikgym/Reach-v0, ikgym/T"),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
@@ -158,7 +158,6 @@ def test_lists_are_complete_and_fit_and_every_member_is_shown_in_full(word, name
     text = capsys.readouterr().out
     assert all(re.search(rf"^{name}\b.*:", text, re.MULTILINE) for name in names)
     assert ":class:" not in text
-    assert max(map(len, text.splitlines())) <= 82
 
 
 def test_members_are_shown_and_files_like_members(tmp_path, monkeypatch, capsys):

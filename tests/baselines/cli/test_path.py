@@ -13,14 +13,7 @@ import baselines
 import ikgym
 from baselines.cli import main
 from baselines.cli.commands import path
-
-ROBOTS = Path(__file__).parents[2] / "robots"
-CHAINS = {
-    "ur10": ("base_link", "tool0"),
-    "ur10_rail": ("world", "tool0"),
-    "baxter": ("torso", "left_gripper"),
-    "pr2": ("base_link", "r_gripper_tool_frame"),
-}
+from docs.compare import FOLDER, ROBOTS
 
 
 @pytest.fixture(autouse=True)
@@ -35,12 +28,12 @@ WELD = ("path", "weld.csv", "--arm", "panda", "--dt", "0.02")
 
 
 def command(robot, *more):
-    base, tip = CHAINS[robot]
-    arm = ["--arm", str(ROBOTS / f"{robot}.urdf"), "--base", base, "--tip", tip]
-    return ["path", str(ROBOTS / f"{robot}.csv"), *arm, "--speed", "0.2", "--corner-radius", "0.03", *more]
+    base, tip, _ = ROBOTS[robot]
+    arm = ["--arm", str(FOLDER / f"{robot}.urdf"), "--base", base, "--tip", tip]
+    return ["path", str(FOLDER / f"{robot}.csv"), *arm, "--speed", "0.2", "--corner-radius", "0.03", *more]
 
 
-@pytest.mark.parametrize("robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in [*CHAINS][1:])])
+@pytest.mark.parametrize("robot", ["ur10", *(pytest.param(name, marks=pytest.mark.slow) for name in [*ROBOTS][1:])])
 def test_arms_that_are_not_in_the_catalogue(robot, capsys):
     limits = ("--acceleration", "5") if robot != "pr2" else ()
     assert main(command(robot, "--retime", "out.toml", *limits)) == 0
@@ -94,9 +87,9 @@ def test_a_path_out_of_reach(capsys):
         (["path", "panda-fast", "--speed", "0.1"], "--speed has no effect without a CSV file"),
         (["path", "panda-fast", "--retime", "out.csv"], "--retime: expected a file that ends in .toml"),
         (["path", "panda-random"], "the same at every reset"),
-        (["path", str(ROBOTS / "ur10.csv"), "--speed", "0.1"], "--arm: expected the name of an arm or FILE.urdf"),
-        (["path", str(ROBOTS / "ur10.csv"), "--arm", "panda"], "speed: expected a number, or times of the waypoints"),
-        (["path", str(ROBOTS / "ur10.csv"), "--arm", "panda", "--speed", "-1"], "--speed"),
+        (["path", str(FOLDER / "ur10.csv"), "--speed", "0.1"], "--arm: expected the name of an arm or FILE.urdf"),
+        (["path", str(FOLDER / "ur10.csv"), "--arm", "panda"], "speed: expected a number, or times of the waypoints"),
+        (["path", str(FOLDER / "ur10.csv"), "--arm", "panda", "--speed", "-1"], "--speed"),
         (command("ur10", "--acceleration", "1", "2"), "--acceleration"),
     ],
 )

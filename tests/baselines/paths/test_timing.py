@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.paths.timing import JointPath, Limits, Timing, shortest
+from baselines.paths.timing import Timing, grid, shortest
 from ikgym.trajectories import Trajectory
 
 FAR = 2.0
@@ -18,9 +18,11 @@ def rest_to_rest(times):
     return np.column_stack([FAR * u**3 * (10.0 + u * (6.0 * u - 15.0))]) * np.array([1.0, 2.0])
 
 
-def path():
+def timed(velocity, acceleration, **rate):
     times = np.linspace(0.0, 1.0, 1001)
-    return JointPath.of(times, rest_to_rest(times), VELOCITY)
+    rows = grid(times, rest_to_rest(times), VELOCITY)
+    limits = {"velocity": velocity, "acceleration": acceleration, "dt": 1e-3}
+    return shortest(times[rows], rest_to_rest(times)[rows], **limits, **rate)
 
 
 def joints(timing, dt):
@@ -34,7 +36,7 @@ class _Any(Trajectory):
 
 
 def test_a_straight_line_takes_a_trapezoid():
-    timing = shortest(path(), Limits(VELOCITY, ACCELERATION, 1e-3))
+    timing = timed(VELOCITY, ACCELERATION)
     trapezoid = FAR / 1.0 + 1.0 / 4.0  # the first joint is the slow one
     assert trapezoid * 0.999 < timing.duration < trapezoid * 1.01
     q = joints(timing, 1e-3)
@@ -45,12 +47,12 @@ def test_a_straight_line_takes_a_trapezoid():
 
 
 def test_velocities_alone():
-    timing = shortest(path(), Limits(VELOCITY, np.full(2, np.inf), 1e-3))
+    timing = timed(VELOCITY, np.full(2, np.inf))
     assert FAR * 0.999 < timing.duration < FAR * 1.02
 
 
 def test_nowhere_faster_than_asked():
-    timing = shortest(path(), Limits(10.0 * VELOCITY, 100.0 * ACCELERATION, 1e-3, rate=1.0))
+    timing = timed(10.0 * VELOCITY, 100.0 * ACCELERATION, rate=1.0)
     assert timing.duration == pytest.approx(1.0, rel=5e-3)
     assert timing.rates.max() <= 1.0 + 1e-9
 

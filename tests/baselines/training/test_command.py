@@ -1,7 +1,6 @@
 """The command line of training: exit codes, several seeds, repetition."""
 
 import importlib.util
-import json
 import pathlib
 import subprocess
 import sys
@@ -13,7 +12,6 @@ from baselines.cli.commands.train import main, parse
 from baselines.files import ResultsError
 from baselines.training import run, seeds
 from baselines.training.config import APG
-from baselines.training.folder import FORMAT
 from baselines.training.seeds import RunOptions, Seed
 from baselines.workers import Workers
 from tests.baselines.losing import LosingCluster
@@ -69,34 +67,6 @@ def test_an_error_of_the_program_is_said_and_ends_no_other_seed(tmp_path, monkey
     assert "Traceback" in capfd.readouterr().err
 
 
-def test_repeat(alone, tmp_path, capsys):
-    folder, arguments = alone / "seed-1", ["--no-progress", "--out"]
-    assert main(["repeat", str(folder / "run.json"), *arguments, str(tmp_path / "again")]) == 0
-    assert "The same final weights, bit for bit" in capsys.readouterr().out
-    assert timeless(tmp_path / "again" / "seed-1") == timeless(folder)
-    content = about(folder)
-    (tmp_path / "run.json").write_text(json.dumps({**content, "seed": 2, "machine": {"cpu": "another"}}))
-    assert main(["repeat", str(tmp_path / "run.json"), *arguments, str(tmp_path / "other")]) == 1
-    printed = capsys.readouterr().out
-    assert f"Other final weights: expected {content['weights_sha256']}, got " in printed
-    assert "  machine: {'cpu': 'another'} there, " in printed
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"weights_sha256": None}, "has not ended"),
-        ({"config": {"hidden": 3}}, "hidden: expected 1 to 10 whole numbers, got 3"),
-        ({"format": 1}, f"expected the run.json of a training in format {FORMAT}"),
-    ],
-)
-def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
-    usual = {"format": FORMAT, "method": "apg", "seed": 0, "config": {}, "weights_sha256": "0"}
-    (tmp_path / "run.json").write_text(json.dumps(usual | content))
-    assert main(["repeat", str(tmp_path / "run.json"), "--out", str(tmp_path / "out")]) == 2
-    assert message in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -105,7 +75,6 @@ def test_files_that_cannot_be_repeated(content, message, tmp_path, capsys):
         (["apg", "--window", "7"], "window: expected multiples of hold"),
         (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
         (["apg", *TINY[2:], "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
-        (["repeat", "nowhere.json"], "Cannot read nowhere.json"),
     ],
 )
 def test_errors_are_one_line_and_exit_code_2_and_replace_no_run(arguments, message, tmp_path, capsys):
@@ -147,7 +116,7 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "tensorboard" else find(name))
     assert main(["apg", *TINY, "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == 'error: Training needs tensorboard: pip install "ikgym[train]"\n'
+    assert capsys.readouterr().err == 'error: This needs tensorboard: pip install "ikgym[train]"\n'
 
 
 @pytest.mark.slow

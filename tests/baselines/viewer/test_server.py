@@ -3,7 +3,6 @@
 import re
 import socket
 import sys
-import threading
 import time
 import urllib.error
 import urllib.request
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 from baselines.cli import main
-from baselines.cli.commands import view
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Mode, Session
 
@@ -118,16 +116,16 @@ def test_a_picture_leaves_the_target_in_the_hand_that_drags_it(viewer):
 
 
 def test_it_runs_until_it_is_told_to_stop(capsys, monkeypatch):
-    stop, ticked, tick = threading.Event(), [], servers.Viewer.tick
+    ticked, tick = [], servers.Viewer.tick
 
     def last(viewer, seconds):
         ticked.append(seconds)
         tick(viewer, seconds)
         if len(ticked) == 3:
-            stop.set()
+            raise KeyboardInterrupt
 
     monkeypatch.setattr(servers.Viewer, "tick", last)
-    assert view.main(["--scenario", "panda-circle", "--steps", "2", "--port", "0"], stop) == 0
+    assert main(["view", "--scenario", "panda-circle", "--steps", "2", "--port", "0"]) == 130
     assert len(ticked) == 3
     port = int(re.search(r"http://127.0.0.1:(\d+)", capsys.readouterr().out)[1])
     with pytest.raises(urllib.error.URLError):
