@@ -1,11 +1,11 @@
-"""Both examples of Zhang 2020."""
+"""Example 1 of Zhang 2020."""
 
 import numpy as np
-import pytest
 
 import baselines
 import ikgym
 from baselines.episodes import rollout
+from baselines.papers.zhang.episodes import PREDICTIVE
 from baselines.status import Status
 from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed
 
@@ -13,7 +13,7 @@ from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import p
 def test_example_1_follows_the_printed_controller():
     """(27), (28) and (44) with constant J; the first measurement is 0, and λ falls from the eighth sample on."""
     scenario = ikgym.scenarios.get("zhang3-helix").replace(steps=120)
-    policy = baselines.make("mfapc_helix", scenario)
+    policy = baselines.make("mfapc", scenario, **PREDICTIVE)
     nominal = scenario.nominal(preview=5)
     q, pose, damping, falls = np.zeros(3), np.zeros(3), 2.0, []
     episode = rollout(scenario, policy, seed=0)
@@ -30,20 +30,3 @@ def test_example_1_follows_the_printed_controller():
     assert all(falls[7:])
     assert episode.position_error[-1] < 0.05
     assert set(episode.status) == {Status.APPLIED}
-
-
-#: (44) of example 1, (59) of example 2.
-RULE_44 = {"rule": "threshold", "damping": 2.0, "growth": 1.1, "decay": 1.02, "threshold": 10.0, "carry": True}
-PRESETS = {
-    "mfac_helix": ("zhang3-helix", "mfac", {**RULE_44, "one_step": True}),
-    "mfapc_helix": ("zhang3-helix", "mfapc", {**RULE_44, "one_step": True, "horizon": 5, "jacobians": "constant"}),
-    "mfapc_line": ("zhang6-lspb", "mfapc", {"rule": "constant", "damping": 0.0, "horizon": 2, "iterations": 10}),
-}
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_a_preset_is_its_solver_with_the_printed_numbers(name):
-    on, solver, numbers = PRESETS[name]
-    preset, plain = baselines.make(name, on), baselines.make(solver, on, **numbers)
-    assert preset.parameters == plain.parameters
-    assert preset.preview == plain.preview
