@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
@@ -90,7 +90,7 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
     return total
 
 
-@kernel
+@inlined
 def tracking_error(data, nominal, q, workspace, error):
     """The tracking error of one grid point: shapes (m,), (n,), a :func:`frame_workspace`, (e,)."""
     rotation, position, pose, _ = workspace
@@ -122,7 +122,7 @@ def analytic_gradient(data, q, nominal, qdot, gradient):
     return total
 
 
-@inner
+@inlined
 def roll_out(dt, q, qdot, states):
     """The joint coordinates at the second and later grid points (eq. 5): a number, (n,), (HL - 1, n), (HL - 1, n)."""
     for i in range(qdot.shape[0]):

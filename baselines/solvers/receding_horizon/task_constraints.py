@@ -19,7 +19,7 @@ from baselines.solvers.receding_horizon.horizon import (
     tracking_error,
 )
 from ikgym.kernels import cost as cost_kernels
-from ikgym.kernels.jit import inner
+from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
@@ -66,7 +66,13 @@ def kinematic_errors(data, nominal, q, errors):
     """ε(q); ``errors`` (HL - 1, e) receives it, other arguments as in :func:`analytic_task_gradient`."""
     workspace = frame_workspace(data.kind, nominal)
     for i in range(q.shape[0]):
-        tracking_error(data, nominal[i], q[i], workspace, errors[i])
+        _error(data, nominal[i], q[i], workspace, errors[i])
+
+
+@kernel
+def _error(data, nominal, q, workspace, error):
+    """ε of one grid point, see :func:`tracking_error`; a kernel of its own, as when its time was measured."""
+    tracking_error(data, nominal, q, workspace, error)
 
 
 @inner
@@ -125,11 +131,11 @@ def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
             x.errors[i, a] = kept + small
             gradient.errors[i, a] = (cost_kernels.tracking(data.cost, x.errors[i]) - tracking) / small
             x.errors[i, a] = kept
-        tracking_error(data, nominal[i], x.q[i], workspace, here)
+        _error(data, nominal[i], x.q[i], workspace, here)
         for j in range(n):
             kept = x.q[i, j]
             x.q[i, j] = kept + small
-            tracking_error(data, nominal[i], x.q[i], workspace, shifted)
+            _error(data, nominal[i], x.q[i], workspace, shifted)
             x.q[i, j] = kept
             for a in range(e):
                 jacobian[i, a, j] = (shifted[a] - here[a]) / small
