@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,22 +20,6 @@ from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, known_names
 
 
-class InnerStep(NamedTuple):
-    """Results of the inner policy in a step.
-
-    Attributes:
-        action: Its actions, as `predict` returns them. Shape (B, n).
-        memory: Its memory, without names.
-        status: Values of :class:`baselines.status.Status`. Shape (B,).
-        iterations: Iterations made. Shape (B,).
-    """
-
-    action: npt.NDArray[np.float32]
-    memory: Memory
-    status: npt.NDArray[np.int64]
-    iterations: npt.NDArray[np.int64]
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wrapper(SolverPolicy, abc.ABC):
     """Base of all policies around another one.
@@ -44,7 +28,7 @@ class Wrapper(SolverPolicy, abc.ABC):
 
         own, inside = self.split(memory)
         step = self.ask(batch, inside)
-        return self.solution(step.action * self.problem.velocity_limit, own, step)
+        return self.solution(step.qdot, own, step)
 
     The inner policy acts as if it were alone: what is not finite or beyond the velocity limit is dealt with as its own
     `predict` does. Its memory stands behind the wrapper's own.
@@ -87,13 +71,13 @@ class Wrapper(SolverPolicy, abc.ABC):
         own = self.own_memory(1)
         return len(own), type(own)
 
-    def ask(self, batch: Batch, memory: Memory) -> InnerStep:
+    def ask(self, batch: Batch, memory: Memory) -> Solution:
         """The inner policy's step, see :meth:`SolverPolicy.act`, for its observations and its part of the memory."""
         assert self.inner is not None
         action, state = self.inner.act(batch, memory)
-        return InnerStep(action, remembered(state), *self.inner.report(state))
+        return Solution(action * self.inner.problem.velocity_limit, remembered(state), *self.inner.report(state))
 
-    def solution(self, qdot: FloatArray, own: Memory, step: InnerStep) -> Solution:
+    def solution(self, qdot: FloatArray, own: Memory, step: Solution) -> Solution:
         """The result of `solve`: status and iterations are those of the inner policy.
 
         Args:

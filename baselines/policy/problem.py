@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.kernels.bodies import Surroundings
+from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
@@ -48,6 +49,12 @@ class Problem(Frozen):
     def largest_qdot(self) -> FloatArray:
         """The largest joint velocities that actions and the limits of the model allow. Shape (n,)."""
         return np.minimum(self.velocity_limit, self.model.velocity_limit)
+
+    def poses(self, q: FloatArray) -> FloatArray:
+        """Task coordinates of the model at joint coordinates of shape (B, n). Shape (B, m)."""
+        out = np.empty((len(q), self.task.size))
+        pose_rows(self.model.chain, self.task.kind, q, out)
+        return out
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:

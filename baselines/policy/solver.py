@@ -59,8 +59,6 @@ class SolverPolicy(Frozen, abc.ABC):
     name: ClassVar[str]
     #: Whether the policy knows more than its observation: a reference, not a contender.
     reference: ClassVar[bool] = False
-    #: Whether its numbers are those of one scenario: an example of a paper, no contender elsewhere.
-    example: ClassVar[bool] = False
     #: Whether it is a solver of another project, whose package is installed with the extra `rivals`.
     rival: ClassVar[bool] = False
     #: Whether it is shown the ages of measurements, past commands and obstacles, where an observation has them.

@@ -33,8 +33,7 @@ def radian(arm: Arm) -> float:
 
     The square root of length times 0.28 m. Joints turn positions by 0.3 times the length or so, and with that much for
     1 rad both parts of the error would go back equally fast; but in the cost 1 m counts as much as 1 rad, whatever the
-    size. The geometric mean of both is within a third of the best on arms of 1 to 21 m, see
-    ``python -m benchmarks --sections defaults``. An arm without length has 1 m.
+    size. The geometric mean of both is within a third of the best on arms of 1 to 21 m. An arm without length has 1 m.
     """
     return math.sqrt(RADIAN * length(arm)) or 1.0
 

@@ -93,7 +93,6 @@ REFUSED = {
     ],
     "varga7-random": [
         ("follow_nominal", {}, "a seed says which episode"),
-        ("fixed_point_extended", {}, "a seed says which episode"),
     ],
     "zhang3-helix": [
         ("follow_nominal", {}, "'zhang3-helix' is given in Cartesian space"),
@@ -103,8 +102,6 @@ REFUSED = {
         ("fixed_point", {"components": (0, 1, 2)}, "expected none with transformation 'transpose'"),
         ("fixed_point", {"components": (0, 1), "transformation": "none"}, "expected 3 different numbers below 3"),
         ("fixed_point", {"length": 1.0, "transformation": "none"}, "expected none but with transformation 'transpose'"),
-        ("fixed_point_extended", {"link": 3}, "expected at most 2"),
-        ("fixed_point_extended", {"transformation": "none"}, "a longer x needs the transposed Jacobian"),
         ("full_orientation", {}, "expected the task 'skew'"),
     ],
     "khan8-q1": [

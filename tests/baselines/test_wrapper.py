@@ -34,7 +34,7 @@ class Halved(NamedWrapper):
     def solve(self, batch, memory):
         own, inside = self.split(memory)
         step = self.ask(batch, inside)
-        return self.solution(0.5 * step.action * self.problem.velocity_limit, Steps(own.made + 1), step)
+        return self.solution(0.5 * step.qdot, Steps(own.made + 1), step)
 
 
 def observation(preview, rows=2):

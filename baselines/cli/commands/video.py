@@ -98,17 +98,16 @@ def pictures(
         Pictures with the policies in two columns, row by row, white where one is missing. Shape (height, width, 3).
     """
     scenario, across, known = stage.scenario, min(len(replays), 2), 0
-    look: dict[str, Any] = {"has_orientation": scenario.task.has_orientation, "surroundings": stage.around}
     renderers = []
     for replay in replays:
         title = f"{scenario.name}: {replay.policy}"
-        renderers.append(Renderer(scenario.arm, "rgb_array", title=title, width=width, **look))
-        renderers[-1].begin(stage.frames[:, 9:], scenario.steps * scenario.dt)
+        renderers.append(Renderer(scenario, "rgb_array", title=title, width=width))
+        renderers[-1].begin(stage.frames[:, 9:])
     for step in steps.tolist():
         for renderer, replay in zip(renderers, replays, strict=True):
             for k in range(known, step + 1):
                 errors = replay.position_error[k], replay.orientation_error[k]
-                renderer.add(replay.q[k], *errors, k * scenario.dt, stage.obstacles(k))
+                renderer.add(k, replay.q[k], *errors, stage.obstacles(k))
         known = step + 1
         tiles: list[Any] = [renderer.draw() for renderer in renderers]
         tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % across)

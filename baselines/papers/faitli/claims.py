@@ -18,12 +18,12 @@ from baselines.papers.faitli.episodes import (
     singular_places,
     singular_values,
     solved,
+    with_end_point,
     yank,
 )
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs, nominal_joints, times
 from baselines.papers.varga.episodes import FAST, SLOW, nominal_angles
-from baselines.recording import Episode
 from baselines.registry import make
 from ikgym.validation import FloatArray
 
@@ -47,15 +47,15 @@ def accurate_in_singularities(runs: Runs) -> Finding:
     return Finding(max(shares.values()) < SAME, scaled(shares, "%"))
 
 
-def _separation(runs: Runs, name: str, episode: Episode) -> FloatArray:
+def _separation(runs: Runs, name: str, q: FloatArray) -> FloatArray:
     """The largest distance of a joint coordinate from its nominal one in [rad]. Shape (steps,)."""
-    out: FloatArray = np.abs(episode.q - nominal_joints(runs.scenario(name))).max(axis=1)
+    out: FloatArray = np.abs(q - nominal_joints(runs.scenario(name))).max(axis=1)
     return out
 
 
 def other_joint_coordinates(runs: Runs) -> Finding:
     """Largest distance of the joint paths."""
-    apart = float(_separation(runs, STRETCHED, solved(runs)).max())
+    apart = float(_separation(runs, STRETCHED, solved(runs).q).max())
     nominal = nominal_joints(runs.scenario(STRETCHED))
     return Finding(apart > 0.1 * np.ptp(nominal, axis=0).max(), {"[rad]": apart})
 
@@ -64,8 +64,8 @@ def separation_at_singularities(runs: Runs) -> Finding:
     """Time between a singular point and the separation of the joint paths."""
     scenario = runs.scenario(STRETCHED)
     time, nominal = times(scenario), nominal_joints(scenario)
-    regular = float(_separation(runs, REGULAR, solved(runs, REGULAR)).max())
-    apart = _separation(runs, STRETCHED, solved(runs))
+    regular = float(_separation(runs, REGULAR, solved(runs, REGULAR).q).max())
+    apart = _separation(runs, STRETCHED, solved(runs).q)
     passes = time[sign_changes(np.linalg.det(jacobians(scenario, nominal)))]
     begin = float(time[int(np.argmax(apart > 10.0 * regular))])
     gap = float(np.abs(passes - begin).min()) if len(passes) else np.inf
@@ -96,10 +96,9 @@ def real_part_zero_is_singular(runs: Runs) -> Finding:
 def end_point_of_link_2(runs: Runs) -> Finding:
     """Largest distance of the joint paths, without and with the end point: A = -1, and A sure to contract."""
     figures = {}
-    sure = make("fixed_point_extended", runs.scenario(STRETCHED)).parameters["a"]
     for name in TRAJECTORIES:
-        episodes = [solved(runs, name), *(runs.play(name, "fixed_point_extended", a=a) for a in (-1.0, sure))]
-        figures[short(name)] = [float(_separation(runs, name, episode).max()) for episode in episodes]
+        paths = [solved(runs, name).q, *(with_end_point(runs.scenario(name), a) for a in (-1.0, None))]
+        figures[short(name)] = [float(_separation(runs, name, path).max()) for path in paths]
     holds = all(max(extended) < plain for plain, *extended in figures.values())
     return Finding(holds, scaled(figures, "mrad"))
 

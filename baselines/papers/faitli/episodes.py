@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from baselines.papers.comparisons import sign_changes
-from baselines.papers.runs import Runs
+from baselines.papers.runs import Runs, nominal_joints
 from baselines.recording import Episode
+from baselines.solvers.arm_size import jacobian_bound
+from ikgym.arms import Arm
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
@@ -28,6 +30,26 @@ def short(name: str) -> str:
 def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> Episode:
     """The paper's method, with the parameters of its Table 1 unless others are given."""
     return runs.play(name, METHOD, **parameters)
+
+
+def with_end_point(scenario: Scenario, a: float | None = None, link: int = 2, iterations: int = 10) -> FloatArray:
+    """The joint path of the method with x extended by the end point of a link, in [rad]. Shape (steps, n).
+
+    h becomes Jᵀ (f(q) - x) + J_ℓᵀ (p_ℓ(q) - p_ℓᴺ); where p_ℓᴺ should be, the nominal joint path tells. If A is left out
+    it is one that is sure to contract, by a bound of the longer Jacobian.
+    """
+    model, path = scenario.model, nominal_joints(scenario)
+    branch = Arm(f"{model.name} up to link {link}", model.offsets[:link], model.axes[:link], tool=model.offsets[link])
+    if a is None:
+        a = -min(1.0, 4.0 / (jacobian_bound(model, scenario.task) + jacobian_bound(branch, None)))
+    targets, points, q, out = model.forward(path)[1], branch.forward(path[:, :link])[1], scenario.start_of(0), []
+    for target, point in zip(targets, points, strict=True):
+        for _ in range(iterations):
+            h = model.jacobian(q)[:3].T @ (model.forward(q)[1] - target)
+            h[:link] += branch.jacobian(q[:link])[:3].T @ (branch.forward(q[:link])[1] - point)
+            q = q + 0.5 * a * h
+        out.append(q)
+    return np.array(out)
 
 
 def past_shoulder(runs: Runs, distance: float) -> Scenario:

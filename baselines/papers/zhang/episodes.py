@@ -15,7 +15,6 @@ from baselines.recording import Episode
 from baselines.registry import make
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory
-from baselines.solvers.levenberg_marquardt.presets import HelixPredictiveControl
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.scenarios import Scenario
@@ -23,6 +22,12 @@ from ikgym.trajectories import StraightLine
 from ikgym.validation import FloatArray
 
 HELIX, LINE = "zhang3-helix", "zhang6-lspb"
+#: The controllers of example 1, (5) and (27), (28) under (44), with λ in [m²] and the threshold in [m], and the
+#: iteration (55)-(59) of example 2, with the printed numbers.
+ADAPTIVE: dict[str, Any] = {"rule": "threshold", "damping": 2.0, "growth": 1.1, "decay": 1.02, "threshold": 10.0}
+ADAPTIVE |= {"carry": True, "one_step": True}
+PREDICTIVE = ADAPTIVE | {"horizon": 5, "jacobians": "constant"}
+ITERATIVE: dict[str, Any] = {"rule": "constant", "damping": 0.0, "horizon": 2, "iterations": 10}
 #: Paths past singular points.
 SINGULAR = ("faitli3-stretched", "faitli3-shoulder")
 SETTLED = 60  # samples after which the transient of example 1 has died away
@@ -30,12 +35,12 @@ SETTLED = 60  # samples after which the transient of example 1 has died away
 
 def predictive(runs: Runs) -> Episode:
     """Example 1: the controller (27), (28), (44) on the helix."""
-    return runs.play(HELIX, "mfapc_helix")
+    return runs.play(HELIX, "mfapc", **PREDICTIVE)
 
 
 def adaptive(runs: Runs) -> Episode:
     """The same without prediction."""
-    return runs.play(HELIX, "mfac_helix")
+    return runs.play(HELIX, "mfac", **ADAPTIVE)
 
 
 def constant(runs: Runs, scenario: str, damping: float, horizon: int = 1) -> Episode:
@@ -48,7 +53,7 @@ def constant(runs: Runs, scenario: str, damping: float, horizon: int = 1) -> Epi
 
 def iterative(runs: Runs, **numbers: Any) -> Episode:
     """Example 2: the iteration (55)-(59) on the line."""
-    return runs.play(LINE, "mfapc_line", **numbers)
+    return runs.play(LINE, "mfapc", **ITERATIVE | numbers)
 
 
 def settled_from(episode: Episode) -> int:
@@ -82,7 +87,7 @@ def jacobians_used(scenario: Scenario, episode: Episode) -> FloatArray:
 
 def lambdas_used(episode: Episode) -> FloatArray:
     """λ(1), λ(2), … of example 1, as the controller used them; its memory holds the next one. Shape (steps,)."""
-    return np.concatenate([[HelixPredictiveControl.damping], episode.diagnostics["lambda"][:-1]])
+    return np.concatenate([[PREDICTIVE["damping"]], episode.diagnostics["lambda"][:-1]])
 
 
 def of_link(runs: Runs, scenario: str, share: float) -> float:
@@ -131,7 +136,7 @@ def along_the_helix(runs: Runs, policy: str, ahead: int, *, hold: bool = False, 
 def unmet_of_the_way(runs: Runs) -> float:
     """The largest error of example 2's horizon that (40) leaves unmet, as a share of the next distance."""
     scenario, episode = runs.scenario(LINE), iterative(runs)
-    policy = make("mfapc_line", scenario)
+    policy = make("mfapc", scenario, **ITERATIVE)
     nominal, later = scenario.nominal(preview=policy.preview), np.arange(2, len(episode.q) + 1)
     q, ahead = episode.q[:-1], np.stack([nominal[later], nominal[later + 1]], axis=1)
     batch = Batch(q, np.zeros_like(q), episode.pose[:-1], ahead, np.ones((len(q), 1)))

@@ -168,7 +168,7 @@ class Corrected(NamedWrapper, abc.ABC):
         pose, shifted = np.empty((rows, task.size)), np.empty(nominal.shape)
         show_rows(self.problem.model.chain, task.kind, batch.q, shown, nominal, pose, shifted)
         step = self.ask(batch._replace(pose=pose, nominal=shifted, pose_age=batch.q_age), inside)
-        return self.solution(step.action * self.problem.velocity_limit, own, step)
+        return self.solution(step.qdot, own, step)
 
 
 @kernel

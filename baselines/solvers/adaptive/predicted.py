@@ -25,7 +25,6 @@ from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.wrapper import NamedWrapper
 from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios.preview import furthest, offsets
 from ikgym.validation import FloatArray, flag, number, whole_number
 
@@ -126,7 +125,7 @@ class Predicted(NamedWrapper):
         behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
         qdot = np.empty_like(batch.q)
         limits, servo = self._limits
-        move_rows(limits, self.problem.dt, step.action * self.inner.problem.velocity_limit, kept.arm_q, kept.arm_qdot)
+        move_rows(limits, self.problem.dt, step.qdot, kept.arm_q, kept.arm_qdot)
         follow_rows(behind, kept.arm_qdot, self._hypotheses.lags, servo, tuple(kept), qdot)
         return self.solution(qdot, kept, step)
 
@@ -188,17 +187,14 @@ class Predicted(NamedWrapper):
         else:
             nominal = batch.nominal[np.arange(rows)[:, None], delay[:, None] + np.array(offsets(preview)) - 1]
         remaining = np.maximum(batch.remaining - delay[:, None], 1.0)
-        return Batch(kept.arm_q.copy(), kept.arm_qdot.copy(), self._pose(kept.arm_q) + kept.offset, nominal, remaining)
+        return Batch(
+            kept.arm_q.copy(), kept.arm_qdot.copy(), self.problem.poses(kept.arm_q) + kept.offset, nominal, remaining
+        )
 
     def _past(self, steps: npt.NDArray[np.int64], kept: PredictedMemory) -> FloatArray:
         """Predicted joint coordinates of the arms, see :func:`past_rows`."""
         out = np.empty_like(kept.sent)
         past_rows(steps, self._hypotheses.lags, tuple(kept), out)
-        return out
-
-    def _pose(self, q: FloatArray) -> FloatArray:
-        out = np.empty((len(q), self.problem.task.size))
-        pose_rows(self.problem.model.chain, self.problem.task.kind, q, out)
         return out
 
 

@@ -28,6 +28,9 @@ from ikgym.validation import FloatArray, as_given, number, per_joint
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
 #: Deformations of the joint coordinates, with their numbers in the kernel.
 DEFORMATIONS = {"rotation": 0, "contraction": 1}
+#: What the listing adds to a norm before division, and where it limits joint coordinates, by a tanh, in [rad] or [m];
+#: neither is printed.
+EPSA, Q_PP_MAX = 1e-12, 1e3
 #: The paper's λ_a, and what it belongs to.
 PAPERS_SHARE, PAPERS_MODEL, PAPERS_TASK = 5e-4, "khan8_approximate", "matrix"
 _JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["task"], DEFORMATIONS["contraction"]
@@ -184,14 +187,12 @@ class AbstractRotation(CompiledPolicy):
         lambda_a: λ_a, the share of the rotation that is applied; with ``"contraction"`` -A F'(ξ*). Above 0. If left
             out, the paper's 5e-4, more on arms shorter than the paper's, so that λ_a ‖J̃‖² is the same, and no more than
             2 / ‖J̃‖², by a bound of ‖J̃‖² from the lengths of the links.
-        epsa: Added to a norm before division, as in the listing. Above 0; not printed.
-        q_pp_max: Where the listing limits joint coordinates, by a tanh, in [rad] or [m]; not printed.
         task_weights: The diagonal of ℱ, a number or one a task coordinate. Above 0, at most 1.
         joint_weights: The diagonal of 𝒲, a number or one a joint. Above 0, at most 1.
         counter_rotation: Vectors that 𝒩 rotates: ``"joints"``, J̃ᵀ ℱ f and J̃ᵀ ℱ xᴺ; ``"task"``, ℱ f and ℱ xᴺ; or
             ``"none"``.
-        deformation: ``"rotation"``, AdaptiveDeform; or ``"contraction"``, Dineva's iteration (eq. 2.9), in which R_a,
-            ``epsa`` and ``q_pp_max`` have no part.
+        deformation: ``"rotation"``, AdaptiveDeform; or ``"contraction"``, Dineva's iteration (eq. 2.9), in which R_a
+            has no part.
         jacobian: ``"step"``: J̃ belongs to the joint coordinates of each inner iteration. ``"point"``: to those with
             which the grid point began, which is when xᴺ changes (the listing's ``J_Prev_a`` may mean either).
         tolerance: ‖xᴺ - f‖ up to which the status is ``converged`` instead of ``iteration_limit``, in [m] and [1].
@@ -203,8 +204,6 @@ class AbstractRotation(CompiledPolicy):
 
     r_a: float = parameter(100.0, number, above=0.0)
     lambda_a: float | None = parameter(None, number, above=0.0)
-    epsa: float = parameter(1e-12, number, above=0.0)
-    q_pp_max: float = parameter(1e3, number, above=0.0)
     task_weights: float | Sequence[float] = 1.0
     joint_weights: float | Sequence[float] = 1.0
     counter_rotation: str = parameter("joints", choice, available=COUNTER_ROTATIONS)
@@ -241,7 +240,7 @@ class AbstractRotation(CompiledPolicy):
     def numbers(self) -> RotationNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         kinds = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
-        rule = self.r_a, self.lambda_a, self.epsa, self.q_pp_max
+        rule = self.r_a, self.lambda_a, EPSA, Q_PP_MAX
         return RotationNumbers(*self._weights, *kinds, rule, self.tolerance)  # type: ignore[arg-type]  # λ_a is known
 
 

@@ -21,8 +21,7 @@ from baselines.solvers.fixed_point.iteration import (
     fixed_point_step,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.kinematics import Chain
-from ikgym.validation import FloatArray, number, read_only, whole_number
+from ikgym.validation import number, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
@@ -101,7 +100,6 @@ class FixedPoint(CompiledPolicy):
 
     def numbers(self) -> FixedPointNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        branch, points = self._extension()
         return FixedPointNumbers(
             TRANSFORMATIONS[self.transformation],
             tuple(self.function),
@@ -111,8 +109,6 @@ class FixedPoint(CompiledPolicy):
             self.problem.velocity_limit * self.problem.dt,
             np.array(self.components or range(self.problem.model.joints)),
             error_weights(self.problem.task, self._metres),
-            tuple(branch),
-            points,
         )
 
     def _checked_components(self) -> tuple[int, ...] | None:
@@ -146,10 +142,6 @@ class FixedPoint(CompiledPolicy):
     def _metres(self) -> float:
         """ℓ; 1 m where nothing is weighed."""
         return 1.0 if self.length is None else self.length
-
-    def _extension(self) -> tuple[Chain, FloatArray]:
-        """The chain to another point that x is extended by, and its nominal positions; here nothing."""
-        return self.problem.model.chain, read_only(np.empty((0, 3)))
 
     def _jacobian_bound(self) -> float:
         """A number that ‖W J‖² does not exceed, with prismatic joints at home."""

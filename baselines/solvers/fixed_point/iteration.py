@@ -12,7 +12,7 @@ from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 from ikgym.validation import FloatArray
 
 #: Transformations of f(q) - x before it is added to q, with their numbers in the kernel.
@@ -58,9 +58,6 @@ class FixedPointNumbers(NamedTuple):
         longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
         components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
         weights: Weights of the squares of the components of f - x, if any. Shape (e,).
-        branch: The plain :class:`Chain` to the point of the arm that x is extended by.
-        points: Where that point should be at each step of the episode, in [m]. Of no rows if x is not extended, else of
-            shape (steps + 1, 3).
     """
 
     transformation: int
@@ -71,30 +68,26 @@ class FixedPointNumbers(NamedTuple):
     longest: FloatArray
     components: npt.NDArray[np.int64]
     weights: FloatArray
-    branch: tuple[Any, ...]
-    points: FloatArray
 
 
 @kernel
 def fixed_point_step(model, numbers, seen, memory, answer):
     """The iterations of one step, row by row; see :class:`CompiledPolicy` for the arguments."""
-    chain, kind, dt, chain_to_point, points = model.chain, model.kind, model.dt, Chain(*numbers.branch), numbers.points
+    chain, kind, dt = model.chain, model.kind, model.dt
     function, transformation, a = Contraction(*numbers.function), numbers.transformation, numbers.a
     iterations, tolerance, longest = numbers.iterations, numbers.tolerance, numbers.longest
     components, weights = numbers.components, numbers.weights
-    starts, nominal, remaining, previous = seen.q, seen.nominal, seen.remaining, memory.previous
+    starts, nominal, previous = seen.q, seen.nominal, memory.previous
     q, status, made = answer
-    n, m, joints = q.shape[1], nominal.shape[2], chain_to_point.axes.shape[0]
+    n, m = q.shape[1], nominal.shape[2]
     e = task_kernels.error_size(kind, m)
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    error, jacobian, partial = np.empty(e), np.empty((e, n)), np.empty((6, joints))
-    h, weighted, missing, pose = np.empty(n), np.empty(e), np.empty(3), np.empty(m)
+    error, jacobian, h, weighted, pose = np.empty(e), np.empty((e, n)), np.empty(n), np.empty(e), np.empty(m)
     for row in range(q.shape[0]):
         start, here, target = starts[row], q[row], nominal[row, 0]
         for j in range(n):
             here[j] = start[j]
         made[row] = iterations
-        at = min(max(points.shape[0] - int(remaining[row]), 0), points.shape[0] - 1)
         first = residual = 0.0
         for step in range(iterations + 1):
             last = step == iterations
@@ -105,7 +98,6 @@ def fixed_point_step(model, numbers, seen, memory, answer):
                 task_kernels.jacobian(kind, rotation, geometric, jacobian)
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, target, pose, error)
-            square = dot(error, error)
             h[:] = 0.0
             if transformation == _TRANSPOSE:
                 for i in range(e):
@@ -114,16 +106,7 @@ def fixed_point_step(model, numbers, seen, memory, answer):
             else:
                 for j in range(n):
                     h[j] = -error[components[j]]
-            if points.shape[0] > 0:
-                if last:
-                    forward(chain_to_point, here[:joints], rotation, position)
-                else:
-                    forward_and_jacobian(chain_to_point, here[:joints], rotation, position, partial)
-                for i in range(3):
-                    missing[i] = points[at, i] - position[i]
-                square += dot(missing, missing)
-                _add_transposed(partial[:3], missing, h)
-            residual = math.sqrt(square)
+            residual = math.sqrt(dot(error, error))
             if step == 0:
                 first = residual
             if last:
@@ -161,7 +144,7 @@ def _contract(function, a, h, q):
 
 @inner
 def _add_transposed(jacobian, missing, h):
-    """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,); the joints past J's columns have no part."""
+    """Adds Jᵀ (f - x) to h, with ``missing`` = x - f of shape (e,)."""
     for i in range(jacobian.shape[0]):
         for j in range(jacobian.shape[1]):
             h[j] -= jacobian[i, j] * missing[i]

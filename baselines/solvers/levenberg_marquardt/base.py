@@ -11,7 +11,14 @@ import numpy as np
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
-from baselines.solvers.levenberg_marquardt.damping import DampingLaw, checked_parameters, damping_law
+from baselines.solvers.levenberg_marquardt.damping import (
+    RULES,
+    DampingLaw,
+    damping_law,
+    damping_table,
+    interval_bounds,
+    rule_defaults,
+)
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, IterationNumbers, iteration_step
 from ikgym.validation import FloatArray, flag, number, whole_number
 
@@ -64,16 +71,16 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     """
 
     rule: str = "constant"
-    damping: float | None = None
-    growth: float | None = None
-    decay: float | None = None
-    threshold: float | None = None
-    restart: bool | None = None
-    carry: bool | None = None
-    weight: float | None = None
-    error_bounds: tuple[float, ...] | None = None
-    condition_bounds: tuple[float, ...] | None = None
-    dampings: tuple[Any, ...] | None = None
+    damping: float | None = parameter(None, number, at_least=0.0)
+    growth: float | None = parameter(None, number, at_least=1.0)
+    decay: float | None = parameter(None, number, at_least=1.0)
+    threshold: float | None = parameter(None, number, above=0.0)
+    restart: bool | None = parameter(None, flag)
+    carry: bool | None = parameter(None, flag)
+    weight: float | None = parameter(None, number, above=0.0)
+    error_bounds: tuple[float, ...] | None = parameter(None, interval_bounds)
+    condition_bounds: tuple[float, ...] | None = parameter(None, interval_bounds)
+    dampings: tuple[Any, ...] | None = parameter(None, damping_table)
     tolerance: float = parameter(1e-10, number, at_least=0.0)
     iterations: int = parameter(500, whole_number, at_least=1)
     one_step: bool = parameter(False, flag)
@@ -83,9 +90,9 @@ class DampedIteration(CompiledPolicy, abc.ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = {name: getattr(self, name) for name in self.parameter_names()}
-        checked = checked_parameters(self.rule, given, self.problem.model)
-        self._settle(**checked, law=damping_law(self.rule, checked))
+        given = {name: getattr(self, name) for rule in RULES.values() for name in rule.numbers}
+        missing = rule_defaults(self.rule, given, self.problem.model)
+        self._settle(**missing, law=damping_law(self.rule, given | missing))
 
     @property
     def rank(self) -> int:

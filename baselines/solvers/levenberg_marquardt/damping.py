@@ -7,7 +7,7 @@ to the squared error, and λ stepped up or down from one iteration to the next.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from baselines.solvers.linear_algebra import orthogonal_columns
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import expanded, inner, kernel
-from ikgym.validation import FloatArray, flag, float_array, frozen_array, known_name, number
+from ikgym.validation import FloatArray, float_array, frozen_array, known_name
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
 
@@ -176,34 +176,31 @@ def _interval(bounds, value):
     return i
 
 
-def checked_parameters(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[str, Any]:
-    """The parameters that a rule has, those left out with their defaults, scaled by the arm's typical link.
+def rule_defaults(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[str, Any]:
+    """The numbers of a rule that are left out, scaled by the arm's typical link.
 
     Args:
         rule: The rule's name.
-        given: All parameters by name; None where one is left out.
+        given: The numbers of all rules by name, checked; None where one is left out.
         arm: The model of the arm.
 
     Raises:
-        InvalidInputError: A number is out of its range, or does not belong to the rule.
+        InvalidInputError: A number is given that does not belong to the rule.
         UnknownNameError: There is no such rule.
     """
     known_name("damping rule", rule, RULES)
-    numbers, length, checked = RULES[rule].numbers, typical_link(arm), {}
-    for name, check in _CHECKS.items():
-        value = given[name]
-        if name in numbers:
-            default = _scaled(numbers[name], length ** LENGTH_POWERS.get(name, 0))
-            checked[name] = check(name, default if value is None else value)
-        elif value is not None:
+    numbers, length = RULES[rule].numbers, typical_link(arm)
+    for name, value in given.items():
+        if value is not None and name not in numbers:
             raise InvalidInputError(
                 f"{name}: expected nothing, as the damping rule {rule!r} has only {', '.join(numbers)}; got {value!r}."
             )
-    return checked
+    scales = {name: length ** LENGTH_POWERS.get(name, 0) for name in numbers}
+    return {name: _scaled(default, scales[name]) for name, default in numbers.items() if given[name] is None}
 
 
 def damping_law(rule: str, parameters: Mapping[str, Any]) -> DampingLaw:
-    """The law that the kernels see, from what :func:`checked_parameters` gave.
+    """The law that the kernels see, from the numbers of its rule by name.
 
     Raises:
         InvalidInputError: The table of λ does not fit its bounds.
@@ -211,7 +208,7 @@ def damping_law(rule: str, parameters: Mapping[str, Any]) -> DampingLaw:
     errors = frozen_array("error_bounds", parameters.get("error_bounds") or np.empty(0))
     conditions = frozen_array("condition_bounds", parameters.get("condition_bounds") or np.empty(0))
     damping = parameters.get("damping") or 0.0
-    dampings = np.atleast_2d(frozen_array("dampings", parameters.get("dampings", damping)))
+    dampings = np.atleast_2d(frozen_array("dampings", parameters.get("dampings") or damping))
     if dampings.shape != (len(errors) + 1, len(conditions) + 1):
         raise InvalidInputError(
             f"dampings: expected {len(errors) + 1} x {len(conditions) + 1} numbers, one more each way than there "
@@ -243,29 +240,25 @@ def _scaled(value: Any, factor: float) -> Any:
     return value if isinstance(value, bool) or factor == 1.0 else value * factor
 
 
-def _bounds(name: str, value: Any) -> tuple[float, ...]:
+def interval_bounds(name: str, value: Any) -> tuple[float, ...]:
+    """Where the intervals of a look-up meet.
+
+    Raises:
+        InvalidInputError: They do not ascend from above 0.
+    """
     bounds = float_array(name, value, (None,))
     if (bounds <= 0.0).any() or (np.diff(bounds) <= 0.0).any():
         raise InvalidInputError(f"{name}: expected ascending numbers above 0, got {bounds.tolist()}.")
     return tuple(bounds.tolist())
 
 
-def _table(name: str, value: Any) -> tuple[Any, ...]:
+def damping_table(name: str, value: Any) -> tuple[Any, ...]:
+    """The dampings of a look-up.
+
+    Raises:
+        InvalidInputError: One is below 0, or they are no rows of numbers.
+    """
     table = float_array(name, value)
     if table.ndim not in (1, 2) or (table < 0.0).any():
         raise InvalidInputError(f"{name}: expected rows of numbers of at least 0, got {table.tolist()}.")
     return tuple(table.tolist()) if table.ndim == 1 else tuple(tuple(row) for row in table.tolist())
-
-
-_CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    "damping": lambda name, value: number(name, value, at_least=0.0),
-    "growth": lambda name, value: number(name, value, at_least=1.0),
-    "decay": lambda name, value: number(name, value, at_least=1.0),
-    "threshold": lambda name, value: number(name, value, above=0.0),
-    "restart": flag,
-    "carry": flag,
-    "weight": lambda name, value: number(name, value, above=0.0),
-    "error_bounds": _bounds,
-    "condition_bounds": _bounds,
-    "dampings": _table,
-}

@@ -8,6 +8,7 @@ import numpy as np
 
 from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
+from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
@@ -36,8 +37,7 @@ class AmongBodiesNumbers(NamedTuple):
     """The parameters of the quadratic program among bodies as its kernel takes them.
 
     Attributes:
-        gain, damping, lm_damping, braking_share, rotation_weight, scaling, pull, limits: See
-            :class:`QuadraticProgramNumbers`.
+        program: Those of the quadratic program.
         clearance: The distance that is kept, in [m].
         influence: The distance from which on a pair is looked at, in [m].
         repulsion: How strongly the joints are led away from what is near, in [1/s].
@@ -45,14 +45,7 @@ class AmongBodiesNumbers(NamedTuple):
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 
-    gain: float
-    damping: float
-    lm_damping: float
-    braking_share: float
-    rotation_weight: float
-    scaling: bool
-    pull: FloatArray
-    limits: FloatArray
+    program: QuadraticProgramNumbers
     clearance: float
     influence: float
     repulsion: float
@@ -129,7 +122,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         How much is left of other preferences: the smallest d / d*, at most 1.
     """
     distances, reaches, bounds, gradients = near
-    n, braking, nearest = velocity.shape[0], numbers.limits[BRAKING], 1.0
+    n, braking, nearest = velocity.shape[0], numbers.program.limits[BRAKING], 1.0
     for j in range(n):
         velocity[j] = 0.0
     for i in range(count):
@@ -150,7 +143,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         for j in range(n):
             velocity[j] += amount * motion[j]
         nearest = min(nearest, distances[i] / reaches[i])
-    _moderate(numbers.limits, q, velocity)
+    _moderate(numbers.program.limits, q, velocity)
     return min(max(nearest, 0.0), 1.0)
 
 
@@ -171,7 +164,7 @@ def _moderate(limits, q, velocity):
 def qp_step_among(model, numbers, seen, memory, answer):
     """One step of :class:`QuadraticProgram` among bodies; see :class:`CompiledPolicy` for the arguments."""
     task, (shapes, checked) = task_motion(model.chain, model.kind, seen, memory), bodies_of(numbers.bodies)
-    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.scaling
+    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.program.scaling
     program = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     near = np.empty(ROWS), np.empty(ROWS), np.empty(ROWS), np.zeros((ROWS, size))
     work = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(size)
@@ -185,12 +178,12 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     """The step of one arm."""
     (hessian, linear, lower, upper), (distances, reaches, bounds, rows), q = program, near, seen.q[row]
     (shapes, checked, places), (projection, motion, preferred, away, x) = bodies, work
-    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.pull
+    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.program.pull
     args = shapes, checked, numbers.boxes[row % numbers.boxes.shape[0]], q, numbers.influence
     count = near_distances(model.chain, *args, places, distances, reaches, rows)
     for j in range(q.shape[0]):
         preferred[j] = pull[0, j] * (pull[1, j] - q[j])
-    weight = row_program(model, numbers, q, seen.qdot[row], jac, shift, error, preferred, program)
+    weight = row_program(model, numbers.program, q, seen.qdot[row], jac, shift, error, preferred, program)
     task_free(hessian, weight, projection)
     left = keep_clear(numbers, model.dt, q, projection, count, near, motion, away)
     for j in range(q.shape[0]):

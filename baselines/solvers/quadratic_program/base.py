@@ -11,7 +11,7 @@ import numpy as np
 
 from baselines.policy.parameters import parameter
 from baselines.solvers.quadratic_program.limits import limits_with_braking
-from baselines.solvers.resolved_rate.base import TaskFeedback
+from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.arms.limits import middle
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 
@@ -41,12 +41,12 @@ class QuadraticProgramNumbers(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class VelocityProgram(TaskFeedback, abc.ABC):
+class VelocityProgram(ResolvedRate, abc.ABC):
     """Minimises task error and joint motion under the limits of position, velocity and acceleration, at each step.
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: Weight of the joint motion as a share of that of the task. Above 0.
         lm_damping: How much that grows with the error. At least 0.
         secondary_gain: K in [1/s], at least 0 and below 2/Δt; 0 for the smallest joint velocity.

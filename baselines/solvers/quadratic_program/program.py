@@ -165,7 +165,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
 
     Args:
         model: The :class:`Model`.
-        numbers: The parameters, those of :class:`QuadraticProgramNumbers` at least.
+        numbers: The :class:`QuadraticProgramNumbers`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
         jacobian: J, which becomes J Δt with the weight of the rotation. Shape (e, n).

@@ -82,7 +82,7 @@ class QuadraticProgram(VelocityProgram):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight: See :class:`VelocityProgram`.
         task_scaling: Whether to keep the direction of the task velocity.
         clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
@@ -117,4 +117,4 @@ class QuadraticProgram(VelocityProgram):
     def numbers_among(self) -> AmongBodiesNumbers:
         """See :meth:`CompiledPolicy.numbers_among`."""
         program = self.program_numbers(scaling=self.task_scaling)
-        return AmongBodiesNumbers(*program, self.clearance, self.influence, self.repulsion, *around(self.problem))
+        return AmongBodiesNumbers(program, self.clearance, self.influence, self.repulsion, *around(self.problem))

@@ -11,7 +11,7 @@ from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from baselines.solvers.resolved_rate.base import APPLIED, TaskFeedback, add_feedback, task_motion
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, number
@@ -116,7 +116,7 @@ def sns_step(model, numbers, seen, memory, answer):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SaturationInNullSpace(TaskFeedback):
+class SaturationInNullSpace(ResolvedRate):
     """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
 
     Each time the joint that would have to be slowed down the most is set to its bound, and what it makes is taken off
@@ -131,7 +131,7 @@ class SaturationInNullSpace(TaskFeedback):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`TaskFeedback`.
+        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
             squares count as lost rank. At least 0; then those below rounding do, and are left out.
 

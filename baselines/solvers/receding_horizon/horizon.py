@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
@@ -80,18 +80,23 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
 @inner
 def _roll(data, here, nominal, qdot, first, stages, workspace):
     """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
-    chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
-    rotation, position, pose, error = workspace
-    total = 0.0
+    cost, error, total = data.cost, workspace[3], 0.0
     for i in range(first, qdot.shape[0]):
         for j in range(here.shape[0]):
-            here[j] += dt * qdot[i, j]  # eq. 5
-        forward(chain, here, rotation, position)
-        task_kernels.coordinates(kind, rotation, position, pose)
-        task_kernels.error(kind, nominal[i], pose, error)
+            here[j] += data.dt * qdot[i, j]  # eq. 5
+        tracking_error(data, nominal[i], here, workspace, error)
         stages[i] = cost_kernels.tracking(cost, error) + cost_kernels.velocity(cost, qdot[i])
         total += stages[i]
     return total
+
+
+@inlined
+def tracking_error(data, nominal, q, workspace, error):
+    """The tracking error of one grid point: shapes (m,), (n,), a :func:`frame_workspace`, (e,)."""
+    rotation, position, pose, _ = workspace
+    forward(data.chain, q, rotation, position)
+    task_kernels.coordinates(data.kind, rotation, position, pose)
+    task_kernels.error(data.kind, nominal, pose, error)
 
 
 @inner
@@ -104,20 +109,10 @@ def frame_workspace(kind, nominal):
 @inner
 def analytic_gradient(data, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
-    steps, n = qdot.shape
-    chain, cost, dt = data.chain, data.cost, data.dt
-    workspace = gradient_workspace(data.kind, nominal, n)
-    rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
-    by_q = np.empty((steps, n))
-    here = q.copy()
-    total = 0.0
-    for i in range(steps):
-        for j in range(n):
-            here[j] += dt * qdot[i, j]
-        forward_and_jacobian(chain, here, rotation, position, geometric)
-        tracking = _tracking_gradient(data, nominal[i], workspace, by_q[i])
-        total += tracking + cost_kernels.velocity(cost, qdot[i])
-        cost_kernels.velocity_gradient(cost, qdot[i], gradient[i])
+    (steps, n), dt = qdot.shape, data.dt
+    states, by_q = np.empty((steps, n)), np.empty((steps, n))
+    roll_out(dt, q, qdot, states)
+    total = analytic_state_gradient(data, nominal, states, qdot, by_q, gradient)
     # A velocity moves all later grid points: sum their derivatives from the end.
     for j in range(n):
         sum_from_end = 0.0
@@ -125,6 +120,14 @@ def analytic_gradient(data, q, nominal, qdot, gradient):
             sum_from_end += by_q[i, j]
             gradient[i, j] += dt * sum_from_end
     return total
+
+
+@inlined
+def roll_out(dt, q, qdot, states):
+    """The joint coordinates at the second and later grid points (eq. 5): a number, (n,), (HL - 1, n), (HL - 1, n)."""
+    for i in range(qdot.shape[0]):
+        for j in range(q.shape[0]):
+            states[i, j] = (states[i - 1, j] if i > 0 else q[j]) + dt * qdot[i, j]
 
 
 @inner
@@ -154,21 +157,16 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     velocity and by the states that it moves, but for rounding.
     """
     steps, n = q.shape
-    chain, kind, cost, dt = data.chain, data.kind, data.cost, data.dt
-    rotation, position, pose, error = frame_workspace(kind, nominal)
-    total = 0.0
+    cost, dt, workspace, total = data.cost, data.dt, frame_workspace(data.kind, nominal), 0.0
+    error = workspace[3]
     for i in range(steps):
-        forward(chain, q[i], rotation, position)
-        task_kernels.coordinates(kind, rotation, position, pose)
-        task_kernels.error(kind, nominal[i], pose, error)
+        tracking_error(data, nominal[i], q[i], workspace, error)
         tracking, velocity = cost_kernels.tracking(cost, error), cost_kernels.velocity(cost, qdot[i])
         total += tracking + velocity
         for j in range(n):
             kept = q[i, j]
             q[i, j] = kept + dt * delta
-            forward(chain, q[i], rotation, position)
-            task_kernels.coordinates(kind, rotation, position, pose)
-            task_kernels.error(kind, nominal[i], pose, error)
+            tracking_error(data, nominal[i], q[i], workspace, error)
             by_q[i, j] = (cost_kernels.tracking(cost, error) - tracking) / (dt * delta)
             q[i, j] = kept
             kept = qdot[i, j]

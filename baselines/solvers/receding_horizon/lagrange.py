@@ -23,6 +23,7 @@ from baselines.solvers.receding_horizon.horizon import (
     analytic_state_gradient,
     difference_state_gradient,
     frame_workspace,
+    roll_out,
 )
 from baselines.solvers.receding_horizon.task_constraints import (
     Unknowns,
@@ -105,9 +106,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
     system = task_system(steps, e, n if with_tasks else 0)
     for row in range(q.shape[0]):
         qdot, step = memory.plan[row], 0
-        for i in range(steps):
-            for j in range(n):
-                states[i, j] = (states[i - 1, j] if i > 0 else q[row, j]) + dt * qdot[i, j]  # eq. 5
+        roll_out(dt, q[row], qdot, states)
         if with_tasks:
             kinematic_errors(data, nominal[row], states, errors)
         first_value = last_norm = 0.0

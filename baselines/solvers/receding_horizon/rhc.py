@@ -166,7 +166,7 @@ class RecedingHorizon(CompiledPolicy):
 
     def numbers_among(self) -> PlanNumbersAmong:
         """See :meth:`CompiledPolicy.numbers_among`."""
-        return PlanNumbersAmong(*self._numbers, self.clearance, swept(self.problem.model), *around(self.problem))
+        return PlanNumbersAmong(self._numbers, self.clearance, swept(self.problem.model), *around(self.problem))
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.

@@ -12,11 +12,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.horizon import frame_workspace, gradient_workspace, linearise
+from baselines.solvers.receding_horizon.horizon import (
+    frame_workspace,
+    gradient_workspace,
+    linearise,
+    tracking_error,
+)
 from ikgym.kernels import cost as cost_kernels
-from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 
 Floats = npt.NDArray[np.float64]
 
@@ -53,7 +58,7 @@ class TaskSystem(NamedTuple):
 def task_system(steps, e, n):
     """A :class:`TaskSystem` of so many stages, components of the error and joints."""
     s = steps * (n + e)
-    return TaskSystem(np.empty((steps, e, n)), np.zeros((s, s)), np.empty(s))
+    return TaskSystem(np.empty((steps, e, n)), np.empty((s, s)), np.empty(s))
 
 
 @inner
@@ -66,11 +71,8 @@ def kinematic_errors(data, nominal, q, errors):
 
 @kernel
 def _error(data, nominal, q, workspace, error):
-    """ε of one grid point. Shapes (m,), (n,), a :func:`frame_workspace`, (e,)."""
-    rotation, position, pose, _ = workspace
-    forward(data.chain, q, rotation, position)
-    task_kernels.coordinates(data.kind, rotation, position, pose)
-    task_kernels.error(data.kind, nominal, pose, error)
+    """ε of one grid point, see :func:`tracking_error`; a kernel of its own, as when its time was measured."""
+    tracking_error(data, nominal, q, workspace, error)
 
 
 @inner
@@ -161,8 +163,9 @@ def reduce_task_gradient(dt, system, gradient):
             multipliers[at + j] = dt * gradient.qdot[i, j]
         for a in range(e):
             multipliers[at + n + a] = -gradient.errors[i, a]
-    if not _solve_banded(system.gram, n + e, multipliers):
+    if not cholesky(system.gram):
         return False
+    cholesky_solve(system.gram, multipliers)
     for i in range(steps):
         at = i * (n + e)
         for j in range(n):
@@ -179,13 +182,12 @@ def reduce_task_gradient(dt, system, gradient):
 
 @inner
 def _assemble(dt, jacobian, gram):
-    """The lower triangle of A Aᵀ within its band; beyond it ``gram`` is not touched."""
+    """The lower triangle of A Aᵀ."""
     steps, e, n = jacobian.shape
+    gram[:] = 0.0
     for i in range(steps):
         at, before = i * (n + e), (i - 1) * (n + e)
         for j in range(n):
-            for k in range(max(0, before + j), at + j):
-                gram[at + j, k] = 0.0
             gram[at + j, at + j] = (1.0 if i == 0 else 2.0) + dt * dt
             if i > 0:
                 gram[at + j, before + j] = -1.0
@@ -199,32 +201,3 @@ def _assemble(dt, jacobian, gram):
                 for j in range(n):
                     total += jacobian[i, a, j] * jacobian[i, b, j]
                 gram[at + n + a, at + n + b] = total
-
-
-@inner
-def _solve_banded(matrix, width, rhs):
-    """Solves a symmetric system in place by Cholesky; False where it is not positive definite.
-
-    The lower triangle of the matrix (s, s), zero further than ``width`` from the diagonal, becomes the factor.
-    """
-    s = rhs.shape[0]
-    for i in range(s):
-        first = max(0, i - width)
-        for j in range(first, i + 1):
-            value = matrix[i, j]
-            for k in range(first, j):
-                value -= matrix[i, k] * matrix[j, k]
-            if j < i:
-                matrix[i, j] = value / matrix[j, j]
-            elif value > 0.0:
-                matrix[i, i] = np.sqrt(value)
-            else:
-                return False
-        for k in range(first, i):
-            rhs[i] -= matrix[i, k] * rhs[k]
-        rhs[i] /= matrix[i, i]
-    for i in range(s - 1, -1, -1):
-        for k in range(i + 1, min(s, i + width + 1)):
-            rhs[i] -= matrix[k, i] * rhs[k]
-        rhs[i] /= matrix[i, i]
-    return True

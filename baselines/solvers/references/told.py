@@ -94,7 +94,7 @@ class Told(NamedWrapper):
         if isinstance(self.inner.preview, int):
             nominal = np.ascontiguousarray(nominal[:, : self.inner.preview])
         step = self.ask(batch._replace(q=q, nominal=nominal), inside)
-        return self.solution(step.action * self.problem.velocity_limit, own, step)
+        return self.solution(step.qdot, own, step)
 
     def _payload(self, batch: Batch) -> FloatArray:
         """Offset of the joint zeros by the payload at the end of the step, in [rad] or [m]. Shape (B, n)."""

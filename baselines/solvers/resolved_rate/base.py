@@ -1,4 +1,4 @@
-"""Resolved rate: what all solvers share that answer a desired task velocity by one linear step."""
+"""Resolved rate: what all solvers share that answer a desired task velocity at each step."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class NominalMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class TaskFeedback(CompiledPolicy, abc.ABC):
+class ResolvedRate(CompiledPolicy, abc.ABC):
     """Asks for the nominal motion of the next step and for a share of the present error, and remembers the former.
 
     The shift asked for in one step is ``Δx = (X^N(k+1) - X^N(k)) + gain (X^N(k) - x(k))``, where X^N(k) is
-    remembered from the step before (at the first step it is taken to be the measured pose). What becomes of it is left
-    to subclasses.
+    remembered from the step before (at the first step it is taken to be the measured pose). Subclasses turn it into
+    ``q̇ Δt`` with the task Jacobian of the model at q(k). Joint velocities beyond their limits are cut joint by joint.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -72,15 +72,6 @@ class TaskFeedback(CompiledPolicy, abc.ABC):
     def full_rank(self) -> int:
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
         return min(self.problem.task.error_size, self.problem.model.joints, 6)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class ResolvedRate(TaskFeedback, abc.ABC):
-    """Follows the nominal motion of the next step, and takes back a share of the present error; see the base.
-
-    The task shift is turned into ``q̇ Δt`` with the task Jacobian of the model at q(k), by a subclass. Joint velocities
-    beyond their limits are cut joint by joint.
-    """
 
 
 @inner

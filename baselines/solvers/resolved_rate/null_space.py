@@ -61,20 +61,14 @@ class AmongBodiesNumbers(NamedTuple):
     """The parameters of :class:`NullSpace` among bodies as its kernel takes them.
 
     Attributes:
-        gain, tolerance, full_rank, damping, secondary_gain, joint_gain, goal: See :class:`NullSpaceNumbers`.
+        plain: Those without bodies.
         influence: The distance from which on a pair is looked at, in [m].
         repulsion: K of the way out, in [1/s].
         bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 
-    gain: float
-    tolerance: float
-    full_rank: int
-    damping: float
-    secondary_gain: float
-    joint_gain: FloatArray
-    goal: FloatArray
+    plain: NullSpaceNumbers
     influence: float
     repulsion: float
     bodies: FloatArray
@@ -84,18 +78,19 @@ class AmongBodiesNumbers(NamedTuple):
 @kernel
 def null_space_step_among(model, numbers, seen, memory, answer):
     """One step of :class:`NullSpace` among bodies; see :class:`CompiledPolicy` for the arguments."""
+    plain = numbers.plain
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
-    add_feedback(numbers.gain, error, shift)
+    add_feedback(plain.gain, error, shift)
     q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
     aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
-    objective_rows(numbers, q, aim)
-    aim *= numbers.secondary_gain
+    objective_rows(plain, q, aim)
+    aim *= plain.secondary_gain
     work = near_work(q.shape[1], shapes.links.shape[0])
     for row in range(q.shape[0]):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
         count = near_distances(model.chain, *around_it, q[row], numbers.influence, work, distances, reaches, gradients)
         repel(distances, reaches, gradients, count, model.dt * numbers.repulsion, aim[row])
-    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
+    aimed_rows(plain, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 
 
@@ -237,7 +232,7 @@ class NullSpace(MoorePenrose):
 
     def numbers_among(self) -> AmongBodiesNumbers:
         """See :meth:`CompiledPolicy.numbers_among`."""
-        return AmongBodiesNumbers(*self.numbers(), self.influence, self.repulsion, *around(self.problem))
+        return AmongBodiesNumbers(self.numbers(), self.influence, self.repulsion, *around(self.problem))
 
 
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:

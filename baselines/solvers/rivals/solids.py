@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.policy import Problem
-from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles.solids import on_links
 from ikgym.validation import FloatArray
 
@@ -59,19 +58,6 @@ def solids_of(problem: Problem) -> Solids:
     met = [(body, len(bodies) + obstacle) for obstacle, body in np.argwhere(around.checked).tolist()]
     each = [_solid(link, row) for link, row in zip(links, rows, strict=True)]
     return Solids(each, [*map(tuple, bodies.pairs.tolist()), *met])
-
-
-def check_at_rest(name: str, problem: Problem) -> None:
-    """Checks that the obstacles stand still, and are the same in all episodes.
-
-    Raises:
-        InvalidInputError: They are shown by the observations instead.
-    """
-    if problem.obstacles_shown:
-        raise InvalidInputError(
-            f"{name}: expected obstacles at rest that are the same in all episodes, since its model is made once; got "
-            "some that move or are drawn."
-        )
 
 
 def geometry_model(solids: Solids, pinocchio: Any, coal: Any) -> Any:

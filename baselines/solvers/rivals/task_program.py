@@ -11,7 +11,7 @@ import numpy as np
 from baselines.policy.parameters import parameter
 from baselines.solvers.rivals.base import Rival, Seen, Step
 from baselines.solvers.rivals.model_files import TIP, geom_name, joint_name, mjcf, urdf
-from baselines.solvers.rivals.solids import Solids, check_at_rest, geometry_model, solids_of
+from baselines.solvers.rivals.solids import Solids, geometry_model, solids_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.validation import FloatArray, number
 
@@ -54,7 +54,11 @@ class TaskProgram(Rival, abc.ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_at_rest(self.name, self.problem)
+        if self.problem.obstacles_shown:
+            raise InvalidInputError(
+                f"{self.name}: expected obstacles at rest that are the same in all episodes, since its model is made "
+                "once; got some that move or are drawn."
+            )
         if self.share > 1.0:
             raise InvalidInputError(f"posture_rate · Δt: expected at most 1, got {self.share:g}.")
 

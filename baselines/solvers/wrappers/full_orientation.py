@@ -163,4 +163,4 @@ class FullOrientation(NamedWrapper):
         shown = batch._replace(nominal=batch.nominal[:, : furthest(self.inner.preview)])
         seen, kept = resolve_orientation(self.problem, shown, own)
         step = self.ask(seen, inside)
-        return self.solution(step.action * self.problem.velocity_limit, kept, step)
+        return self.solution(step.qdot, kept, step)

@@ -12,7 +12,6 @@ from baselines.policy import Batch, Memory, Solution
 from baselines.policy.parameters import choice, parameter
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.tasks import pose_rows
 from ikgym.validation import FloatArray, number
 
 
@@ -95,18 +94,12 @@ class Smoothed(NamedWrapper):
         seen = batch
         if self.feedback == "calculated":
             qdot = np.where(known, own.qdot, batch.qdot)
-            seen = batch._replace(q=calculated, qdot=qdot, pose=self._pose(calculated))
+            seen = batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated))
         step = self.ask(seen, inside)
-        velocity = step.action.astype(np.float64) * limit
         # The arm does not exceed the limit.
         sent = np.clip(own.smooth, -limit, limit)
         acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16
         kept = SmoothedMemory(
-            np.ones_like(own.known), calculated + dt * velocity, velocity, sent + dt * acceleration
+            np.ones_like(own.known), calculated + dt * step.qdot, step.qdot, sent + dt * acceleration
         )  # eq. 17
         return self.solution(own.smooth.copy(), kept, step)
-
-    def _pose(self, q: FloatArray) -> FloatArray:
-        out = np.empty((len(q), self.problem.task.size))
-        pose_rows(self.problem.model.chain, self.problem.task.kind, q, out)
-        return out

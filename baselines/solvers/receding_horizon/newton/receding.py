@@ -77,7 +77,7 @@ def plan_step_among(model, numbers, seen, memory, answer):
     shapes, checked = bodies_of(numbers.bodies)
     influence = numbers.clearance + INFLUENCE
     clearance = Clearance(shapes, numbers.boxes, checked, numbers.sweep, numbers.clearance, influence)
-    plan_rows(model, numbers, seen, memory, answer, clearance)
+    plan_rows(model, numbers.plan, seen, memory, answer, clearance)
 
 
 @expanded

@@ -55,16 +55,14 @@ class PlanNumbersAmong(NamedTuple):
     """The parameters as the kernel of a step among bodies takes them.
 
     Attributes:
-        prismatic, numbers, integers: See :class:`PlanNumbers`.
+        plan: Those without bodies.
         clearance: The distance that is kept at the knots, in [m].
         sweep: See :class:`bodies.Clearance`. Shape (k, n).
         bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
 
-    prismatic: npt.NDArray[np.bool_]
-    numbers: Floats
-    integers: Integers
+    plan: PlanNumbers
     clearance: float
     sweep: Floats
     bodies: Floats

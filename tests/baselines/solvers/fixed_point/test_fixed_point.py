@@ -141,36 +141,6 @@ def test_a_is_the_papers_on_the_papers_arm_and_turns_with_the_slope():
     assert jacobian_bound(ikgym.arms.get("faitli3"), None) == pytest.approx(1.3**2 + 1.3**2 + 0.5**2)
 
 
-class TestExtended:
-    def test_a_step_follows_both_errors(self):
-        scenario = ikgym.scenarios.get(REGULAR)
-        policy = baselines.make("fixed_point_extended", scenario, iterations=1, a=-0.5, link=2)
-        observation = observed(REGULAR, Q)
-        q, _, _ = stepped(policy, observation)
-        model = scenario.model
-        target = scenario.nominal_joint_path()[1]
-
-        def both(q):
-            return np.concatenate([model.forward(q)[1], model.joint_points(q)[2, 0]])
-
-        central = np.stack([(both(Q + s) - both(Q - s)) / 2e-6 for s in 1e-6 * np.eye(3)], axis=1)
-        wanted = -0.25 * central.T @ (both(Q) - both(target))
-        np.testing.assert_allclose(q - Q, wanted, rtol=1e-6, atol=1e-10)
-
-    def test_the_tool_in_its_place_is_not_enough(self):
-        """The elbow on the other side: nothing is wrong with x, and yet nothing has converged."""
-        scenario = ikgym.scenarios.get(REGULAR)
-        policy = baselines.make("fixed_point_extended", scenario, iterations=1, a=-1e-9)
-        there = scenario.nominal_joint_path()[1]
-        # Mirrored at the line from the shoulder to the tool.
-        turned = 2 * np.arctan2(0.5 * np.sin(there[2]), 0.8 + 0.5 * np.cos(there[2]))
-        mirrored = np.array([there[0], there[1] + turned, -there[2]])
-        for q, wanted in ((there, Status.CONVERGED), (mirrored, Status.ITERATION_LIMIT)):
-            observation = observed(REGULAR, q)
-            np.testing.assert_allclose(observation["pose"], observation["nominal"][0], atol=1e-9)
-            assert stepped(policy, observation)[2] == wanted
-
-
 def largest_error(transformation, a, steps=3000):
     scenario = ikgym.scenarios.get(BENT).replace(steps=steps)
     given = {"transformation": transformation, "a": a, "iterations": 1, "components": (0, 1)}

@@ -8,7 +8,6 @@ import ikgym
 from baselines.solvers.levenberg_marquardt.damping import (
     LARGEST,
     RULES,
-    condition_number,
     damping_next,
     damping_now,
     typical_link,
@@ -66,17 +65,3 @@ def test_defaults_scale_with_the_length_of_a_link():
     assert made.dampings[2][2] == pytest.approx(0.1 * length**2)
     made = baselines.make("mfac", "zhang3-helix", rule="threshold")
     assert (made.damping, made.threshold) == pytest.approx((1e-3 * length**2, 0.1 * length))
-
-
-@pytest.mark.parametrize("name", ["varga7-fast", "khan8-q1"])
-def test_condition_number(name):
-    scenario, rng = ikgym.scenarios.get(name), np.random.default_rng(0)
-    for q in rng.uniform(-1, 1, (10, scenario.joints)):
-        rotation, _, geometric = scenario.model.forward_and_jacobian(q)
-        jacobian = scenario.task.jacobian(rotation, geometric)
-        e, n = jacobian.shape
-        rank = min(e, n, 6)
-        sigma = np.linalg.svd(jacobian, compute_uv=False)
-        scratch = np.empty((max(e, n), min(e, n))), np.empty((min(e, n), min(e, n)))
-        assert condition_number(jacobian, rank, scratch) == pytest.approx(sigma[0] / sigma[rank - 1], rel=1e-9)
-    assert condition_number(np.zeros((3, 4)), 3, (np.empty((4, 3)), np.empty((3, 3)))) == np.inf

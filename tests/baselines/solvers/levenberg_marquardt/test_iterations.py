@@ -6,9 +6,10 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.episodes import rollout
+from baselines.papers.zhang.episodes import PREDICTIVE
 from baselines.policy import Batch
 from baselines.status import Status
-from tests.baselines.solvers.levenberg_marquardt.test_block_tridiagonal import printed as dense
 
 RULES = {
     "constant": {"damping": 0.05},
@@ -24,6 +25,18 @@ RULES = {
     "chan": {"weight": 2.0},
 }
 HELIX = ikgym.scenarios.get("zhang3-helix")
+
+
+def dense(jacobians, residuals, damping):
+    """(27): [Ψ̄ᵀ Ψ̄ + λ I]⁻¹ Ψ̄ᵀ r, as least squares of the augmented system, which squares no condition number."""
+    n, e, joints = jacobians.shape
+    psi = np.zeros((n * e, n * joints))
+    for i in range(n):
+        for j in range(i + 1):
+            psi[i * e : (i + 1) * e, j * joints : (j + 1) * joints] = jacobians[j]
+    augmented = np.vstack([psi, damping**0.5 * np.eye(n * joints)])
+    rhs = np.concatenate([residuals.ravel(), np.zeros(n * joints)])
+    return np.linalg.lstsq(augmented, rhs, rcond=None)[0].reshape(n, joints)
 
 
 def batch_of(scenario, q, nominal, pose=None):
@@ -253,3 +266,25 @@ def test_carried_lambda_goes_on_and_a_new_episode_forgets_it(carry):
         dampings.append(state[2][0])
     wanted = [1.02**-1, 1.02**-2, 1.02**-3, 1.02**-1] if carry else [1.02**-1] * 4
     assert dampings == pytest.approx(wanted, rel=1e-14)
+
+
+def test_example_1_follows_the_printed_controller():
+    """(27), (28) and (44) with constant J; the first measurement is 0, and λ falls from the eighth sample on."""
+    scenario = ikgym.scenarios.get("zhang3-helix").replace(steps=120)
+    policy = baselines.make("mfapc", scenario, **PREDICTIVE)
+    nominal = scenario.nominal(preview=5)
+    q, pose, damping, falls = np.zeros(3), np.zeros(3), 2.0, []
+    episode = rollout(scenario, policy, seed=0)
+    for k in range(120):
+        residuals = nominal[k + 1 : k + 6] - pose
+        q = q + dense(np.stack([scenario.model.jacobian(q)[:3]] * 5), residuals, damping)[0]
+        pose = scenario.model.forward(q)[1]
+        far = np.linalg.norm(residuals) > 10
+        damping = damping * 1.1 if far else damping / 1.02
+        falls.append(not far)
+        # The actions are float32; the loop forgets what they leave.
+        np.testing.assert_allclose(episode.q[k], q, atol=1e-4)
+    assert falls.index(True) == 7
+    assert all(falls[7:])
+    assert episode.position_error[-1] < 0.05
+    assert set(episode.status) == {Status.APPLIED}
