@@ -32,7 +32,17 @@ Record = Mapping[str, Any]
 LOWEST = "lowest in the table"
 BEST_KNOWN = "best known"
 #: Suffixes of columns and the units in the heads.
-UNITS = {"us": "µs", "ms": "ms", "s": "s", "mm": "mm", "mrad": "mrad", "rad": "rad", "deg": "°", "percent": "%"}
+UNITS = {
+    "us": "µs",
+    "um": "µm",
+    "ms": "ms",
+    "s": "s",
+    "mm": "mm",
+    "mrad": "mrad",
+    "rad": "rad",
+    "deg": "°",
+    "percent": "%",
+}
 #: Columns that are set as code.
 CODE = ("policy", "scenario", "agent", "solver", "beside")
 
