@@ -49,8 +49,8 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, free_timing, skew, agents_panda, bodies, plants,
-    contexts, compare, loop, retimed and obstructed."""
+    """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda, bodies,
+    plants, contexts, compare, loop, retimed and obstructed."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
 
@@ -81,8 +81,8 @@ def _group(name: str, old: list[Line], only_new: bool) -> list[Line]:
         some = [line for line in todo if int(line["episodes"]) == episodes]
         played = [policy for line in some for policy in policies(line)]
         rows = evaluate(scenario, played, episodes=episodes, **resumable(f"{name}-{old[0]['scenario']}-{episodes}"))
-        extra = {"period_ms": old[0].get("period_ms")}
-        found += [one | extra | _error(one, rows) for one in records(rows, [line["policy"] for line in some])]
+        before = {line["policy"]: line for line in some}  # with columns that say which policy this is
+        found += [before[one["policy"]] | one | _error(one, rows) for one in records(rows, list(before))]
     best = front(found) if "front" in old[0] else []
     found = [{**line, "front": "yes" if line in best else "no"} for line in found]
     return sorted(found, key=lambda line: float(line["cost_ratio"]))
