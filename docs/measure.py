@@ -49,8 +49,8 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda, bodies,
-    plants, contexts, compare, loop, retimed and obstructed."""
+    """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda,
+    bodies, plants, contexts, compare, loop, retimed and obstructed."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
 
