@@ -44,12 +44,12 @@ def policies() -> list[tuple[str, ...]]:
 
 def test_sets() -> list[tuple[str, ...]]:
     """One line per test set."""
-    rows: list[tuple[str, ...]] = [("set", "episodes", "noise seeds", "steps", "task coordinates")]
+    rows: list[tuple[str, ...]] = [("set", "episodes", "noise seeds", "steps")]
     for one in map(sets.get, sets.names()):
         scenario = one.scenario
         which = f"{one.episodes}"
         which += f", {one.sequence} in a row by one arm" if one.sequence > 1 else ""
-        rows.append((f"`{one.name}`", which, str(one.noise_seeds), f"{scenario.steps:,}", f"`{scenario.task.name}`"))
+        rows.append((f"`{one.name}`", which, str(one.noise_seeds), f"{scenario.steps:,}"))
     return rows
 
 
