@@ -22,7 +22,7 @@ from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.paths import Circle
 from ikgym.trajectories.time_laws import Trapezoidal
 
-#: Policies, and what the controller is told of the drives.
+#: Policies, and what the controller knows of the drives.
 LOOPS = (
     ("qp", "identify"),
     ("qp", "given"),

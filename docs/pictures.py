@@ -76,7 +76,7 @@ def _space(axes: Any, joints: Any, path: FloatArray, reference: FloatArray, step
 
 def _close(axes: Any, paths: dict[str, FloatArray], reference: FloatArray, step: int) -> None:
     """The paths near a step: along the reference to the right, across it upwards."""
-    # The reference comes by more than once: only what is near in time is shown.
+    # The reference comes by more than once: only the part near in time is shown.
     part = slice(max(step - AROUND, 0), step + AROUND)
     centre = min(reference[part], key=lambda point: float(np.linalg.norm(point - paths[POLICIES[0]][step])))
     along = reference[step + 1] - reference[step]
