@@ -10,7 +10,7 @@ import sys
 import tyro
 
 from baselines.files import write
-from benchmarks import bodies, environments, horizons, loop, policies, poses, resets
+from benchmarks import environments, horizons, loop, policies, poses, resets
 from benchmarks.measuring import FULL, QUICK
 from benchmarks.table import Table, page
 
@@ -18,7 +18,6 @@ SECTIONS = {
     "environments": environments.tables,
     "resets": resets.tables,
     "kinematics": poses.tables,
-    "bodies": bodies.tables,
     "policies": policies.tables,
     "loop": loop.tables,
     "horizons": horizons.tables,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import statistics
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -14,10 +13,9 @@ import baselines
 import ikgym
 from baselines.policy import Problem, SolverPolicy
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
-from baselines.status import Status
 from benchmarks.measuring import FULL, Effort, medians
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
+from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from benchmarks.table import Table
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -34,51 +32,40 @@ POLICIES: dict[str, tuple[str, dict[str, Any], int]] = {
 }
 CONDITIONS = (
     "At {states} states of an episode of rhc, one arm, one thread. Each solver starts from its own plan of the step "
-    "before, after {lead} such steps; solve is the median over the states, slowest the slowest of them, each the "
-    "median of {solves} interleaved calls. Iterations, converged (the share of states at which the solver reports "
-    "convergence) and cost are means; excess is the fraction by which the cost is above the lowest of all solvers at "
-    "that state, median and worst. rhc_gradient makes 450 steps, the paper's limit, or fewer if it diverges. IPOPT's "
-    "barrier leaves about 1e-9 of cost, a large fraction of a tiny one."
+    "before, after {lead} such steps; solve is the median over the states, each the median of {solves} interleaved "
+    "calls. Excess is the fraction by which the cost is above the lowest of all solvers, median and worst. "
+    "rhc_gradient makes 450 steps, the paper's limit, or fewer if it diverges."
 )
-COLUMNS = ("solve [µs]", "slowest [µs]", f"× {EXACT}", "iterations", "converged", "cost", "excess", "worst excess")
+COLUMNS = ("solve [µs]", f"× {EXACT}", "excess", "worst excess")
 Observation = dict[str, FloatArray]
 
 
 class Solve(NamedTuple):
-    """A call that solves a state, to be timed, and the function that makes a plan of its result."""
+    """A call that solves a state, to be timed, and the function that gives joint coordinates and cost of its result."""
 
     call: Callable[[], Any]
-    plan: Callable[[Any], Plan]
+    plan: Callable[[Any], tuple[FloatArray, float]]
 
 
 def tables(effort: Effort = FULL) -> list[Table]:
     """One table per horizon."""
-    texts = itertools.chain(
-        [CONDITIONS.format(states=effort.states, lead=effort.lead, solves=effort.solves)],
-        itertools.repeat("States, columns and conditions as in the first table of horizons."),
-    )
-    return [_table(ikgym.scenarios.get(SCENARIO), grid, effort, next(texts)) for grid in effort.grids]
+    return [_table(ikgym.scenarios.get(SCENARIO), grid, effort) for grid in effort.grids]
 
 
-def _table(scenario: Scenario, grid: int, effort: Effort, conditions: str) -> Table:
+def _table(scenario: Scenario, grid: int, effort: Effort) -> Table:
     states = along(scenario, grid - 1, effort.states, effort.lead)
     solves = [solvers(scenario, grid, state) for state in states]
     # One call a turn: the slow ones would take minutes otherwise, and the fast ones have as many turns.
     calls = {(label, i): one.call for i, some in enumerate(solves) for label, one in some.items()}
-    plans = [{label: one.plan(one.call()) for label, one in some.items()} for some in solves]
+    costs = [{label: one.plan(one.call())[1] for label, one in some.items()} for some in solves]
     times = medians(calls, effort.solves, 0.0)
-    best = [min(plan.cost for plan in some.values()) for some in plans]
     reference = statistics.median(times[EXACT, i] for i in range(len(states)))
     rows: dict[str, tuple[float | None, ...]] = {}
     for label in solves[0]:
-        spent, reached = [times[label, i] for i in range(len(states))], [some[label] for some in plans]
-        excess = [plan.cost / lowest - 1.0 for plan, lowest in zip(reached, best, strict=True)]
-        middle = statistics.median(spent)
-        means = [
-            statistics.fmean(getattr(plan, key) for plan in reached) for key in ("iterations", "converged", "cost")
-        ]
-        costs = statistics.median(excess), max(excess)
-        rows[label] = 1e6 * middle, 1e6 * max(spent), middle / reference, *means, *costs
+        spent = statistics.median(times[label, i] for i in range(len(states)))
+        excess = [some[label] / min(some.values()) - 1.0 for some in costs]
+        rows[label] = 1e6 * spent, spent / reference, statistics.median(excess), max(excess)
+    conditions = CONDITIONS.format(states=effort.states, lead=effort.lead, solves=effort.solves)
     return Table(f"A horizon of {grid} grid points in {scenario.name}", conditions, COLUMNS, rows)
 
 
@@ -97,11 +84,9 @@ def _policy(policy: SolverPolicy, observations: Sequence[Observation]) -> Solve:
     for observation in observations[:-1]:
         _, state = policy.predict(observation, state)
 
-    def plan(result: Any) -> Plan:
+    def plan(result: Any) -> tuple[FloatArray, float]:
         q = plan_of(policy, last, result[1])
-        cost = plan_cost(policy.problem, Horizon(last["q"], last["nominal"][: len(q)]), q)
-        status, iterations = (int(array[0]) for array in policy.report(result[1]))
-        return Plan(q, cost, iterations, status in (Status.CONVERGED, Status.SATURATED))
+        return q, plan_cost(policy.problem, Horizon(last["q"], last["nominal"][: len(q)]), q)
 
     return Solve(lambda: policy.predict(last, state), plan)
 
@@ -112,7 +97,7 @@ def _ipopt(solver: CasadiHorizon, observations: Sequence[Observation]) -> Solve:
     for horizon in horizons[:-1]:
         q = solver.solve(horizon, start).q
         start = np.vstack([q[1:], q[-1:]])
-    return Solve(lambda: solver.solve(horizons[-1], start), lambda plan: plan)
+    return Solve(lambda: solver.solve(horizons[-1], start), lambda plan: (plan.q, plan.cost))
 
 
 def plan_of(policy: SolverPolicy, observation: Observation, state: Any) -> FloatArray:

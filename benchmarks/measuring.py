@@ -32,7 +32,7 @@ class Effort:
     seconds: float = 0.05
     rows: tuple[int, ...] = (64, 1024, 16384)
     steps: int = 1000
-    grids: tuple[int, ...] = (3, 10, 30, 100)
+    grids: tuple[int, ...] = (3, 30)
     states: int = 5
     solves: int = 7
     lead: int = 3

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from baselines.evaluation.metrics import describe
-from baselines.evaluation.table import number
+from baselines.evaluation.table import grid, number
 
 #: Libraries whose versions are stated, besides those of :func:`baselines.evaluation.metrics.describe`.
 LIBRARIES = ("gymnasium", "mujoco", "envpool", "pin", "casadi", "stable-baselines3", "torch")
@@ -34,11 +34,10 @@ class Table:
 
     def markdown(self) -> str:
         """With heading and conditions."""
-        cells = [["", *self.columns], *([name, *map(number, row)] for name, row in self.rows.items())]
-        head, *rows = (f"| {' | '.join(line)} |" for line in cells)
-        ruler = f"| :-- |{' --: |' * len(self.columns)}"
+        cells = [[name, *map(number, row)] for name, row in self.rows.items()]
         notes = ["", *(f"- left out: {why}" for why in self.skipped)] if self.skipped else []
-        return "\n".join([f"## {self.title}", "", self.conditions, "", head, ruler, *rows, *notes])
+        table = grid(["", *self.columns], cells, text=[0])
+        return "\n".join([f"## {self.title}", "", self.conditions, "", table, *notes])
 
 
 def page(tables: Sequence[Table], run: Mapping[str, Any]) -> str:

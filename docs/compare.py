@@ -1,19 +1,17 @@
-"""Measures `docs/results/compare.csv`, ``ikgym compare`` on four arms: ``python -m docs.compare``."""
+"""The table `compare`: ``ikgym compare`` on four arms that are not in the catalogue."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from baselines.cli.own_path import OwnPath, scenario_of
 from baselines.evaluation.compare import Comparison, compare
 from baselines.evaluation.compare.playing import AS_IT_IS, LATE, RETIMED, solver_of
 from baselines.evaluation.compare.rule import PREFERRED, Rows, fault
-from baselines.evaluation.records import to_csv
 from baselines.evaluation.table import number
-from baselines.files import write
-from docs.measure import RESULTS
+from docs.keeping import Line
 from ikgym.scenarios import Scenario
 
 FOLDER = Path(__file__).parents[1] / "tests" / "robots"
@@ -41,7 +39,7 @@ ROBOTS = {
 }
 
 
-def lines(name: str, found: Comparison) -> list[dict[str, Any]]:
+def lines(name: str, found: Comparison) -> list[Line]:
     """The largest position errors in [mm], one line a path; a cross where a solver does not follow."""
     chosen, out = found.recommendation, []
     for path in (AS_IT_IS, RETIMED, LATE):
@@ -58,15 +56,11 @@ def _cell(rows: Rows, solver: str, dt: float) -> str:
     return number(1e3 * rows[solver].position_error_max) + " ✗" * bool(fault(rows[solver], dt))
 
 
-def main() -> None:
-    """Writes the table."""
+def measured() -> list[Line]:
+    """The table."""
     table = []
     for name, robot in ROBOTS.items():
         found = compare(robot.scenario(name), progress=True)
         print(f"{name}, {robot.speed} m/s\n\n{found.table()}\n", file=sys.stderr)
         table += lines(name, found)
-    write(RESULTS / "compare.csv", to_csv(table).encode())
-
-
-if __name__ == "__main__":
-    main()
+    return table

@@ -19,16 +19,13 @@ import tyro
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import lost
-from baselines.evaluation.records import from_csv
 from baselines.files import write_json
 from baselines.statistics import geometric_interval, geometric_mean
 from baselines.training.config import PPO, RecurrentPPO
+from docs.keeping import RUNS, Line, lines, resumable
 from ikgym.rl import Task, scoring
 from ikgym.validation import BoolArray, FloatArray
 
-RESULTS, RUNS = Path(__file__).parent / "results" / "contexts.csv", Path("runs")
-#: What was measured lies here until the end.
-WORK = Path("results") / "measure"
 #: Scenario and seeds of each split, and its episodes.
 SPLITS = {
     "train": ("learning-context", "train"),
@@ -62,7 +59,6 @@ LEARNERS = {
 }
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
-Line = dict[str, Any]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,11 +73,9 @@ class Command:
     """One training each."""
 
 
-def measured(*, only_new: bool = False, only_times: bool = False) -> list[Line]:
+def measured(*, only_new: bool = False) -> list[Line]:
     """The table: costs relative to the policy that is told the plant, and the share of the gap to it that is closed."""
-    old = {line["policy"]: line for line in from_csv(RESULTS.read_text(encoding="utf-8"))} if RESULTS.exists() else {}
-    if only_times:
-        return list(map(dict, old.values()))
+    old = {line["policy"]: line for line in lines("contexts")}
     told, out = _solver(TOLD), []
     for name in POLICIES:
         known = old[name] if only_new and name in old else None
@@ -110,8 +104,8 @@ def _solver(name: str) -> Played:
     """A policy on the first episodes of each split."""
     out = {}
     for split, (scenario, seeds) in SPLITS.items():
-        kept: dict[str, Any] = {"out": WORK / f"contexts-{split}-{name}", "resume": True, "report": False}
-        rows = evaluate(scenario, [POLICIES[name]], split=seeds, episodes=EPISODES, progress=True, **kept)
+        options = resumable(f"contexts-{split}-{name}")
+        rows = evaluate(scenario, [POLICIES[name]], split=seeds, episodes=EPISODES, **options)
         out[split] = np.array([[row.total_cost for row in rows]]), np.array([[row.lost for row in rows]])
     return out
 

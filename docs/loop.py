@@ -1,4 +1,4 @@
-"""Measures the control loop on drives with delay and lag: ``python -m docs.loop``.
+"""The table `loop`: the control loop on drives with delay and lag.
 
 The Panda, without limits of acceleration as from a URDF file, moves its tool on a circle of 0.1 m at 0.1 m/s for two
 seconds. Errors count after the first one. A command is compared with the largest velocity that the same joint has on
@@ -8,25 +8,21 @@ perfect drives.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import tyro
 
 import baselines
 import ikgym
 from baselines import Controller, Drives, Guards
-from baselines.evaluation.records import from_csv, to_csv
-from baselines.files import write
-from docs.measure import RESULTS
+from docs.keeping import Line
 from ikgym.trajectories.orientations import FixedOrientation
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.paths import Circle
 from ikgym.trajectories.time_laws import Trapezoidal
 
-#: Policies, and what the controller is told of the drives.
+#: Policies, and what the controller knows of the drives.
 LOOPS = (
     ("qp", "identify"),
     ("qp", "given"),
@@ -71,45 +67,18 @@ def peaks(scenario: ikgym.Scenario, policy: str = "qp") -> Any:
     return np.abs(baselines.track(scenario, policy).qdot).max(axis=0)
 
 
-def measured(policy: str, told: str, period: float, lag: float | None, delay: int) -> dict[str, Any]:
+def line(policy: str, told: str, period: float, lag: float | None, delay: int) -> Line:
     """One line of the table."""
     arm, drives = ikgym.arms.get("panda"), Drives(delay, lag)
     scenario = circle(arm.replace(acceleration_limit=np.full(7, np.inf)), arm.home, period)
     lost = Guards(position_error=None, orientation_error=None)
     known = {"perfect": Drives(), "given": drives, "identify": "identify"}[told]
     errors, commands = played(Controller(scenario, policy, known, guards=lost), with_drives(scenario, drives))
-    line = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
+    case = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
     times = (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max()
-    return line | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}
+    return case | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}
 
 
-def table() -> list[tuple[str, ...]]:
-    """One row for each policy and control period, from `loop.csv`."""
-    lines = from_csv((RESULTS / "loop.csv").read_text(encoding="utf-8"))
-    columns = [(f"{float(lag or 0.0) * 1e3:g}", str(delay)) for lag, delay in itertools.product(LAGS, DELAYS)]
-    rows: list[tuple[str, ...]] = [("policy", "drives", "Δt [ms]", *(f"{lag} ms, {delay}" for lag, delay in columns))]
-    for (policy, told), period in itertools.product(LOOPS, PERIODS):
-        here = {
-            (f"{float(one['lag_ms']):g}", one["delay"]): _cell(one)
-            for one in lines
-            if (one["policy"], one["drives"], float(one["period_ms"])) == (policy, told, 1e3 * period)
-        }
-        rows.append((f"`{policy}`", told, f"{1e3 * period:g}", *(here[column] for column in columns)))
-    return rows
-
-
-def _cell(line: Mapping[str, str]) -> str:
-    """Error in [µm] and peak, with two digits."""
-    error, peak = float(line["error_um"]), float(line["times_peak"])
-    return f"{error:,.0f}, {peak:.2g}" if error >= 10.0 else f"{error:.2g}, {peak:.2g}"
-
-
-def main() -> None:
-    """Writes `loop.csv`."""
-    cases = itertools.product(LOOPS, PERIODS, LAGS, DELAYS)
-    lines = [measured(*loop, period, lag, delay) for loop, period, lag, delay in cases]
-    write(RESULTS / "loop.csv", to_csv(lines).encode())
-
-
-if __name__ == "__main__":
-    tyro.cli(main, description=__doc__)
+def measured() -> list[Line]:
+    """The table."""
+    return [line(*loop, *case) for loop, *case in itertools.product(LOOPS, PERIODS, LAGS, DELAYS)]

@@ -1,14 +1,13 @@
-"""Problems with obstacles that others published, by CppFlow's rule: ``python -m docs.obstructed``.
+"""The table `obstructed`: problems with obstacles that others published, by CppFlow's rule.
 
-Writes `results/obstructed_paths.csv`, a line for each problem, and their sums, `results/obstructed.csv`. A line that
-stands there is not measured again. The start is free: `qp` plays from up to a hundred postures at the first pose,
-`rhc_foresight` from the start that `planned` has. The joint velocities of both are limited to 7° a waypoint.
+`obstructed_paths.csv` has a line for each problem, and the table its sums. A line that stands there is not measured
+again. The start is free: `qp` plays from up to a hundred postures at the first pose, `rhc_foresight` from the start
+that `planned` has. The joint velocities of both are limited to 7° a waypoint.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -17,17 +16,15 @@ import numpy as np
 import baselines
 from baselines.episodes import rollout
 from baselines.evaluation.motion.published_rule import TRAVEL, TURN, Verdict, verdict
-from baselines.evaluation.records import from_csv, to_csv
-from baselines.files import write
 from baselines.paths import motion
 from baselines.paths.routes import Routes
 from baselines.paths.starts import solutions
+from docs.keeping import Line, keep, lines
 from ikgym import problems, scenarios
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-RESULTS = Path(__file__).parent / "results"
-PATHS, TABLE = RESULTS / "obstructed_paths.csv", RESULTS / "obstructed.csv"
+PATHS = "obstructed_paths"
 #: Sets of problems by the beginnings of their names.
 SETS = {"RL-ITG, drawn": "rlitg-s", "RL-ITG, random": "rlitg-obstacle", "CppFlow": "cppflow"}
 #: Columns of the table: what passes.
@@ -36,7 +33,7 @@ POLICIES = ("planned", "qp", "rhc_foresight", "published")
 STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500})
 
 
-def line(name: str) -> dict[str, Any]:
+def line(name: str) -> Line:
     """What passes of a problem, and how many of its poses can be reached, with and without collisions."""
     scenario = scenarios.get(name)
     alone, poses = scenario.replace(collisions=False), len(problems.waypoints(name).positions)
@@ -47,7 +44,7 @@ def line(name: str) -> dict[str, Any]:
     if len(found) < len(free):
         found = route(scenario, FINE)
     whole = len(found) == poses
-    out: dict[str, Any] = {"problem": name, "poses": poses, "reached": len(found), "without_collisions": len(free)}
+    out: Line = {"problem": name, "poses": poses, "reached": len(found), "without_collisions": len(free)}
     for policy in ("planned", "rhc_foresight"):
         out[policy] = int(judged(scenario, found[0], policy).passed) if whole else 0
     passed, starts = among_starts(scenario)
@@ -93,11 +90,11 @@ def among_starts(scenario: Scenario) -> tuple[int, int]:
     return sum(verdict(scenario, paths[:, i]).passed for i in range(len(q))), len(q)
 
 
-def table(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def table(problem_lines: Sequence[Line]) -> list[Line]:
     """How many problems have a way, and how many each policy passes."""
     out = []
     for label, beginning in SETS.items():
-        here = [one for one in lines if one["problem"].startswith(beginning)]
+        here = [one for one in problem_lines if one["problem"].startswith(beginning)]
         ways = {
             key: sum(int(one[key]) == int(one["poses"]) for one in here) for key in ("without_collisions", "reached")
         }
@@ -106,16 +103,12 @@ def table(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
-def main() -> None:
-    """Measures what is missing."""
-    lines = list(from_csv(PATHS.read_text(encoding="utf-8"))) if PATHS.exists() else []
+def measured() -> list[Line]:
+    """The table, after what is missing was measured."""
+    done = lines(PATHS)
     for name in problems.OBSTRUCTED:
-        if not any(one["problem"] == name for one in lines):
-            lines.append(line(name))
-            write(PATHS, to_csv(lines).encode())
-            print(" ".join(map(str, lines[-1].values())), flush=True)
-    write(TABLE, to_csv(table(lines)).encode())
-
-
-if __name__ == "__main__":
-    main()
+        if not any(one["problem"] == name for one in done):
+            done.append(line(name))
+            keep(PATHS, done)
+            print(" ".join(map(str, done[-1].values())), flush=True)
+    return table(done)

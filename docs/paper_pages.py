@@ -12,18 +12,17 @@ from pathlib import Path
 
 import PIL.Image
 
-from baselines.evaluation.records import from_csv
 from baselines.files import write
 from baselines.papers import PAPERS, ledger
+from docs.keeping import PAGES, RESULTS, lines
 
-RESULTS = Path(__file__).parent / "results" / "papers.csv"
-IMAGES = Path(__file__).parent / "images" / "papers"
+IMAGES = PAGES / "images" / "papers"
 COLOURS = 32
 
 
 def claims() -> str:
     """The tables of all claims, in Markdown."""
-    return ledger.markdown(list(PAPERS.values()), from_csv(RESULTS.read_text(encoding="utf-8")))
+    return ledger.markdown(list(PAPERS.values()), lines("papers"))
 
 
 def main() -> None:
@@ -34,7 +33,7 @@ def main() -> None:
             picture, out = source / paper.name / f"figure-{figure.number:02d}.png", io.BytesIO()
             PIL.Image.open(picture).convert("RGB").quantize(COLOURS).save(out, format="png", optimize=True)
             write(IMAGES / f"{paper.name}-{figure.number:02d}.png", out.getvalue())
-    write(RESULTS, (source / "claims.csv").read_bytes())
+    write(RESULTS / "papers.csv", (source / "claims.csv").read_bytes())
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,11 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.evaluation.plots import comparison, style
-from baselines.evaluation.records import from_csv
 from baselines.files import write
+from docs.keeping import PAGES, lines
 from ikgym.validation import FloatArray
 
-IMAGES = Path(__file__).parent / "images"
-RESULTS = Path(__file__).parent / "results"
+IMAGES = PAGES / "images"
 SCENARIO = "varga7-fast"
 #: Policies whose paths are drawn, the first one in space, too.
 POLICIES = ("rhc_gradient", "rhc", "rhc_foresight")
@@ -78,7 +76,7 @@ def _space(axes: Any, joints: Any, path: FloatArray, reference: FloatArray, step
 
 def _close(axes: Any, paths: dict[str, FloatArray], reference: FloatArray, step: int) -> None:
     """The paths near a step: along the reference to the right, across it upwards."""
-    # The reference comes by more than once: only what is near in time is shown.
+    # The reference comes by more than once: only the part near in time is shown.
     part = slice(max(step - AROUND, 0), step + AROUND)
     centre = min(reference[part], key=lambda point: float(np.linalg.norm(point - paths[POLICIES[0]][step])))
     along = reference[step + 1] - reference[step]
@@ -103,19 +101,14 @@ def _close(axes: Any, paths: dict[str, FloatArray], reference: FloatArray, step:
     )
 
 
-def results(name: str) -> list[dict[str, str]]:
-    """The lines of a CSV file of results."""
-    return from_csv((RESULTS / f"{name}.csv").read_text(encoding="utf-8"))
-
-
 def drawn() -> dict[str, Figure]:
     """The pictures of the results, by the names of their files."""
     title = "rhc_foresight by horizon, geometric mean and 95 % interval"
-    on_main = [line for line in results("cost_time") if line["scenario"] == "varga7-pose-random"]
+    on_main = [line for line in lines("cost_time") if line["scenario"] == "varga7-pose-random"]
     return {
         "cost-time": comparison.cost_time(on_main, "varga7-pose-random, 256 episodes"),
-        "foresight": comparison.foresight(results("foresight"), title, "knows_end"),
-        "robustness": comparison.severity_map(results("robustness_map")),
+        "foresight": comparison.foresight(lines("foresight"), title, "knows_end"),
+        "robustness": comparison.severity_map(lines("robustness_map")),
     }
 
 

@@ -1,4 +1,4 @@
-"""Measures `docs/results/retimed.csv`: ``python -m docs.retimed``. Paths that are too fast, in the time they need."""
+"""The table `retimed`: paths that are too fast, in the time that they need."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import dataclasses
 import math
 from typing import Any
 
-from baselines.evaluation.records import to_csv
-from baselines.files import write
 from baselines.paths import retime
 from baselines.paths.motion import ideal, path_duration, played
 from baselines.paths.survey import follows
 from baselines.paths.timing import Timing
-from docs.measure import RESULTS
+from docs.keeping import Line
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -50,12 +48,12 @@ def _follows(scenario: Scenario, start: FloatArray, factor: float) -> bool:
     return follows(played(ideal(scenario, trajectory=trajectory, start=start), start[None]))
 
 
-def lines() -> list[dict[str, Any]]:
-    """One line a path."""
+def measured() -> list[Line]:
+    """The table, one line a path."""
     return [_line(name, times) for name, times in PATHS]
 
 
-def _line(name: str, times: int) -> dict[str, Any]:
+def _line(name: str, times: int) -> Line:
     scenario = faster(name, times)
     found = retime(scenario)
     slowed = min(by_one_factor(scenario, start) for start in (scenario.start_of(), found.motion.q[0, 0]))
@@ -68,7 +66,3 @@ def _line(name: str, times: int) -> dict[str, Any]:
         "retimed_s": found.duration,
         "error_mm": error,
     }
-
-
-if __name__ == "__main__":
-    write(RESULTS / "retimed.csv", to_csv(lines()).encode())

@@ -37,7 +37,17 @@ COLUMNS: tuple[str, ...] = (
 )
 PATH, CONTACTS = ("path_time_s", "path_error_mm"), ("stopped_percent", "clearance_mm")
 #: Suffixes of columns and the units in the heads.
-UNITS = {"us": "µs", "ms": "ms", "s": "s", "mm": "mm", "mrad": "mrad", "rad": "rad", "deg": "°", "percent": "%"}
+UNITS = {
+    "us": "µs",
+    "um": "µm",
+    "ms": "ms",
+    "s": "s",
+    "mm": "mm",
+    "mrad": "mrad",
+    "rad": "rad",
+    "deg": "°",
+    "percent": "%",
+}
 #: Columns that are set as code.
 CODE = ("policy", "scenario", "agent", "solver", "beside")
 

@@ -1,1 +1,1 @@
-"""The receding horizon of Varga 2021 in CasADi and in NumPy, which share no line of arithmetic with ikgym."""
+"""The receding horizon of Varga 2021 in CasADi, which shares no line of arithmetic with ikgym."""

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 
 from baselines.policy import Problem
-from benchmarks.rivals import casadi_kinematics
+from benchmarks.rivals.casadi_kinematics import residual
 from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
@@ -78,14 +78,14 @@ class CasadiHorizon:
         y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
         start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
         h, w, before = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots), casadi.SX.sym("qdot", n)
-        residual = self._residual
+        error = residual(problem)
         cost, power = casadi.SX(0), int(problem.cost.p_x)
         above = []
         for k in range(knots):
             qdot = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
             cost += h[k] * casadi.sum1((qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
             cost += w[k] * casadi.sum1(t[:, k])
-            r = residual(start + problem.dt * y[:, k], nominal[:, k])
+            r = error(start + problem.dt * y[:, k], nominal[:, k])
             above.append(t[:, k] - r**2)
             if power > 2:
                 above += [t[:, k] - r**power, t[:, k] + r**power] if power % 2 else [t[:, k] - r**power]
@@ -114,21 +114,12 @@ class CasadiHorizon:
             before, here = qdot, y[:, k]
         return out
 
-    @functools.cached_property
-    def _residual(self) -> Any:
-        """The error of one knot in units of Δx, as a function of q and the nominal coordinates."""
-        problem = self.problem
-        q, nominal = casadi.SX.sym("q", problem.model.joints), casadi.SX.sym("nominal", problem.task.size)
-        rotation, position = casadi_kinematics.forward(problem.model, q)
-        r = casadi_kinematics.error(problem.task.name, nominal, rotation, position) / problem.cost.delta_x
-        return casadi.Function("residual", [q, nominal], [r])
-
     def solve(self, horizon: Horizon, start: FloatArray | None = None) -> Plan:
         """The optimum from one state, begun at joint coordinates (K, n) at the knots, or at rest."""
         problem = self.problem
         rest = np.tile(horizon.q, (self.knots, 1))
         y = ((rest if start is None else start) - horizon.q) / problem.dt
-        r = np.array(self._residual.map(self.knots)(horizon.q[:, None] + problem.dt * y.T, horizon.nominal.T))
+        r = np.array(residual(problem)(horizon.q[:, None] + problem.dt * y.T, horizon.nominal.T))
         t = np.maximum(r**2, np.abs(r) ** problem.cost.p_x)
         answer = self.solver(
             x0=np.concatenate([y.ravel(), t.T.ravel()]),

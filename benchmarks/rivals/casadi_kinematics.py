@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import casadi
 
+from baselines.policy import Problem
 from ikgym.arms import Arm
 from ikgym.kernels.axes import SINGULAR
+
+
+@functools.lru_cache(maxsize=64)
+def residual(problem: Problem) -> Any:
+    """The error in units of Δx as a function of joint coordinates (n,) and nominal task coordinates (m,), or (…, K)."""
+    q, nominal = casadi.SX.sym("q", problem.model.joints), casadi.SX.sym("nominal", problem.task.size)
+    r = error(problem.task.name, nominal, *forward(problem.model, q)) / problem.cost.delta_x
+    return casadi.Function("residual", [q, nominal], [r])
 
 
 def forward(arm: Arm, q: Any) -> tuple[Any, Any]:

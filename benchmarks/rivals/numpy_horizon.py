@@ -1,4 +1,4 @@
-"""The horizon problem in plain NumPy: one cost function for the plans of all solvers.
+"""The horizon problem in NumPy, with the errors of CasADi: one cost function for the plans of all solvers.
 
 Over knots 1 … K behind a start q_0, with lengths h_k in steps and weights w_k, a plan q_1 … q_K costs
 ``Σ_k h_k Φ^U((q_k - q_{k-1}) / (h_k Δt)) + w_k Φ^X(error(X^N_k, F(q_k)))``; the horizon of HL grid points of
@@ -13,8 +13,7 @@ import dataclasses
 import numpy as np
 
 from baselines.policy import Problem
-from ikgym.arms import Arm
-from ikgym.kernels.axes import SINGULAR
+from benchmarks.rivals.casadi_kinematics import residual
 from ikgym.validation import FloatArray
 
 
@@ -79,12 +78,9 @@ def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
     """The cost of a plan, joint coordinates (K, n) at the knots in [rad] or [m]."""
     cost, h = problem.cost, horizon.lengths
     qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h[:, None] * problem.dt)
-    errors = [
-        error(problem.task.name, x, coordinates(problem.task.name, *forward(problem.model, row)))
-        for x, row in zip(horizon.nominal, q, strict=True)
-    ]
+    errors = np.array(residual(problem)(q.T, horizon.nominal.T)).T
     velocity = _powers(qdot / cost.delta_qdot, cost.p_in, cost.p_out)
-    tracking = _powers(np.array(errors) / cost.delta_x, 2.0, cost.p_x)
+    tracking = _powers(errors, 2.0, cost.p_x)
     return float(h @ velocity + horizon.tracking_weights @ tracking)
 
 
@@ -106,50 +102,6 @@ def beyond_limits(problem: Problem, horizon: Horizon, q: FloatArray, braking: bo
         "velocity": float(np.max(np.abs(qdot) - problem.largest_qdot)),
         "acceleration": float(np.max(np.abs(qddot) - arm.acceleration_limit)),
     }
-
-
-def forward(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and position (3,) in [m] of the tool: the product of Varga 2021, eq. 6 and 8."""
-    rotation, position = np.eye(3), np.zeros(3)
-    for offset, axis, prismatic, angle in zip(arm.offsets, arm.axes, arm.prismatic, q, strict=True):
-        position = position + rotation @ (offset + angle * axis if prismatic else offset)
-        if not prismatic:
-            cross = np.cross(np.eye(3), axis)
-            rotation = rotation @ (np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
-    return rotation @ arm.tool_rotation, position + rotation @ arm.tool
-
-
-def coordinates(task: str, rotation: FloatArray, position: FloatArray) -> FloatArray:
-    """Task coordinates of a pose. Shape (m,)."""
-    if task == "position":
-        return position
-    if task == "skew":
-        return np.concatenate([(0.5 * (rotation - rotation.T))[[0, 0, 1], [1, 2, 2]], position])
-    return np.concatenate([rotation[:, 2] if task == "axis" else rotation.ravel(), position])
-
-
-def error(task: str, nominal: FloatArray, here: FloatArray) -> FloatArray:
-    """The error with respect to the nominal coordinates. Shape (e,)."""
-    if task == "axis":
-        return np.concatenate([nominal[3:] - here[3:], _direction_error(nominal[:3], here[:3])])
-    if task != "pose":
-        return nominal - here
-    turn = nominal[:9].reshape(3, 3) @ here[:9].reshape(3, 3).T
-    double_sine = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    length = float(np.linalg.norm(double_sine))
-    angle = np.arctan2(length, np.trace(turn) - 1.0)
-    return np.concatenate([nominal[9:] - here[9:], double_sine * (angle / length if length > 0.0 else 0.5)])
-
-
-def _direction_error(nominal: FloatArray, here: FloatArray) -> FloatArray:
-    """The rotation vector from an axis to its nominal one, along the two directions across the latter. Shape (2,)."""
-    reference, first = -np.array(SINGULAR), np.array([1.0, -1.0, 0.0]) / np.sqrt(2.0)
-    cross = np.cross(np.eye(3), np.cross(reference, nominal))
-    carried = np.eye(3) + cross + cross @ cross / (1.0 + reference @ nominal)
-    sine = np.cross(here, nominal)
-    length = float(np.linalg.norm(sine))
-    vector = sine * (np.arctan2(length, here @ nominal) / length if length > 0.0 else 1.0)
-    return np.array([carried @ first, carried @ np.cross(reference, first)]) @ vector
 
 
 def _powers(x: FloatArray, inside: float, outside: float) -> FloatArray:

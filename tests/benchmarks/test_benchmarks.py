@@ -9,7 +9,7 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from benchmarks import bodies, horizons, measuring, pose_solvers, poses
+from benchmarks import horizons, measuring, pose_solvers, poses
 from benchmarks.__main__ import SECTIONS, Command, main
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from benchmarks.table import Table, page
@@ -74,15 +74,6 @@ def test_both_kinematics_are_of_the_same_arm():
     np.testing.assert_allclose(data.oMf[frame].translation, arm.forward(q)[1], atol=1e-12)
 
 
-def test_coal_measures_the_same_bodies():
-    arm, obstacles = ikgym.arms.get(bodies.ARM), bodies.ten_boxes()
-    q = bodies.postures(arm, 20)
-    measure, found = bodies.with_coal(arm, obstacles)
-    for row, distance in zip(q, arm.clearance(q, obstacles)[0], strict=True):
-        measure(row)
-        assert min(one.min_distance for one in found.distanceResults) == pytest.approx(distance, abs=1e-9)
-
-
 def test_states_lead_to_one_another():
     scenario = ikgym.scenarios.get("varga7-fast").replace(steps=30)
     for seen in horizons.along(scenario, preview=4, count=2, lead=3):
@@ -98,12 +89,10 @@ def test_costs_of_solvers_are_those_of_their_plans():
     (seen,) = horizons.along(scenario, preview=4, count=1, lead=2)
     costs = {}
     for label, (call, plan) in horizons.solvers(scenario, 5, seen).items():
-        found = plan(call())
-        assert found.q.shape == (4, 7)
+        q, costs[label] = plan(call())
+        assert q.shape == (4, 7)
         horizon = Horizon(seen[-1]["q"], seen[-1]["nominal"])
-        assert found.cost == pytest.approx(plan_cost(Problem.of(scenario), horizon, found.q))
-        assert found.iterations >= 1
-        costs[label] = found.cost
+        assert costs[label] == pytest.approx(plan_cost(Problem.of(scenario), horizon, q))
     assert min(costs.values()) == pytest.approx(costs[horizons.IPOPT], rel=1e-4)
     assert costs["rhc_gradient, analytic"] > costs[horizons.IPOPT]
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import ikgym
-from benchmarks.bodies import postures, ten_boxes
 from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels.bodies import near_rows
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from tests.coal_distances import postures, ten_boxes, with_coal
 
 #: A step of joint coordinates, and how much a gradient changes over ten of them where there is no kink.
 STEP, SMOOTH = 1e-6, 1e-2
@@ -138,3 +138,12 @@ def test_plain_python_measures_the_same():
     compiled = [[p, d, *g] for row in near(RAIL, postures(RAIL, 5)) for d, p, g in row]
     assert [tuple(pair) for pair, *_ in plain] == [pair for pair, *_ in compiled]
     np.testing.assert_allclose([row[1:] for row in plain], [row[1:] for row in compiled], rtol=0, atol=1e-14)
+
+
+def test_coal_measures_the_same_distances():
+    arm, obstacles = ikgym.arms.get("panda-hand"), ten_boxes()
+    q = postures(arm, 20)
+    measure, found = with_coal(arm, obstacles)
+    for row, distance in zip(q, arm.clearance(q, obstacles)[0], strict=True):
+        measure(row)
+        assert min(one.min_distance for one in found.distanceResults) == pytest.approx(distance, abs=1e-9)

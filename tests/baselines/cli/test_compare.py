@@ -6,9 +6,8 @@ import pytest
 
 from baselines.cli import main
 from baselines.evaluation.compare.rule import PREFERRED
-from baselines.evaluation.records import from_csv
+from docs import keeping
 from docs.compare import FOLDER, ROBOTS
-from docs.measure import RESULTS
 
 
 def compared(robot, path, capsys, *options):
@@ -35,7 +34,7 @@ def test_a_short_path(capsys, tmp_path):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_arms_of_the_page(robot, capsys):
     rows, text = compared(robot, FOLDER / f"{robot}.csv", capsys, "--speed", str(ROBOTS[robot].speed))
-    lines = [one for one in from_csv((RESULTS / "compare.csv").read_text(encoding="utf-8")) if one["arm"] == robot]
+    lines = [one for one in keeping.lines("compare") if one["arm"] == robot]
     (chosen,) = (line for line in lines if line["recommended"])
     on_the_path = " on the retimed path" * (chosen["path"] == "retimed")
     assert re.search(rf"^Recommended: {chosen['recommended']}{on_the_path}[.,]", text, re.MULTILINE)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from baselines.evaluation.motion.published_rule import verdict
-from baselines.evaluation.records import from_csv, to_csv
-from docs import obstructed
+from baselines.evaluation.records import to_csv
+from docs import keeping, obstructed
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError
 
@@ -61,15 +61,15 @@ def test_bad_input():
 
 
 def test_the_table_of_the_page_sums_up_its_problems():
-    lines = list(from_csv(obstructed.PATHS.read_text(encoding="utf-8")))
+    lines = keeping.lines(obstructed.PATHS)
     assert [line["problem"] for line in lines] == list(problems.OBSTRUCTED)
-    assert to_csv(obstructed.table(lines)) == obstructed.TABLE.read_text(encoding="utf-8")
+    assert to_csv(obstructed.table(lines)) == (keeping.RESULTS / "obstructed.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
 def test_a_problem_of_the_table_is_measured_anew():
     name = "cppflow-panda-2cubes"
-    [line] = [one for one in from_csv(obstructed.PATHS.read_text(encoding="utf-8")) if one["problem"] == name]
+    [line] = [one for one in keeping.lines(obstructed.PATHS) if one["problem"] == name]
     measured = obstructed.line(name)
     assert {key: str(measured[key]) for key in line if not key.startswith("qp_")} == {
         key: value for key, value in line.items() if not key.startswith("qp_")

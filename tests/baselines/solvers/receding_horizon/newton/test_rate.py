@@ -8,7 +8,8 @@ import pytest
 
 import baselines
 import ikgym
-from benchmarks.rivals.casadi_horizon import OPTIONS, CasadiHorizon
+from benchmarks.rivals.casadi_horizon import OPTIONS
+from benchmarks.rivals.casadi_kinematics import residual
 from tests.baselines.solvers.receding_horizon.newton.problems import Place, place
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense, differences
 from tests.baselines.solvers.receding_horizon.test_rhc import planned, states_near
@@ -46,7 +47,7 @@ def ipopt(policy, horizon, qdot, start):
     problem, knots, h = policy.problem, horizon.knots, horizon.lengths
     n, e, cost = problem.model.joints, problem.task.error_size, problem.cost
     y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
-    residual, before, length = CasadiHorizon(problem, knots)._residual, casadi.DM(qdot), 1.0
+    error, before, length = residual(problem), casadi.DM(qdot), 1.0
     total, above = casadi.SX(0), []
     for k in range(knots):
         speed = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
@@ -54,12 +55,12 @@ def ipopt(policy, horizon, qdot, start):
         total += horizon.tracking_weights[k] * casadi.sum1(t[:, k])
         total += policy.rate_weight * casadi.sumsqr(speed - before) / (0.5 * (length + h[k]))
         before, length = speed, h[k]
-        r = residual(horizon.q + problem.dt * y[:, k], horizon.nominal[k])
+        r = error(horizon.q + problem.dt * y[:, k], horizon.nominal[k])
         above += [t[:, k] - r**2, t[:, k] - r**3, t[:, k] + r**3]
     nlp = {"x": casadi.vertcat(casadi.vec(y), casadi.vec(t)), "f": total, "g": casadi.vertcat(*above)}
     solver = casadi.nlpsol("rated", "ipopt", nlp, OPTIONS)
     first = (start - horizon.q) / problem.dt
-    r = np.array(residual.map(knots)(start.T, horizon.nominal.T))
+    r = np.array(error(start.T, horizon.nominal.T))
     answer = solver(x0=np.concatenate([first.ravel(), np.maximum(r**2, abs(r) ** 3).T.ravel()]), lbg=0.0, ubg=np.inf)
     assert solver.stats()["success"]
     return float(answer["f"])
