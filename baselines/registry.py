@@ -31,9 +31,11 @@ _SOLVERS = "baselines.solvers"
 _import_paths: dict[str, str] = {
     "moore_penrose": f"{_SOLVERS}.resolved_rate.moore_penrose:MoorePenrose",
     "dls": f"{_SOLVERS}.resolved_rate.dls:DampedLeastSquares",
+    "jacobian_transpose": f"{_SOLVERS}.resolved_rate.jacobian_transpose:JacobianTranspose",
     "weighted_pseudoinverse": f"{_SOLVERS}.resolved_rate.weighted_pseudoinverse:WeightedPseudoinverse",
     "null_space": f"{_SOLVERS}.resolved_rate.null_space:NullSpace",
     "truncated_svd": f"{_SOLVERS}.resolved_rate.truncated_svd:TruncatedSVD",
+    "gram_schmidt": f"{_SOLVERS}.resolved_rate.gram_schmidt:GramSchmidt",
     "qp": f"{_SOLVERS}.quadratic_program.qp:QuadraticProgram",
     "qp_path": f"{_SOLVERS}.quadratic_program.path_following:PathFollowing",
     "sns": f"{_SOLVERS}.quadratic_program.sns:SaturationInNullSpace",

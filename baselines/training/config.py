@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 import tyro
@@ -125,6 +125,10 @@ class APG(Frozen):
             number, "max_gradient_share", "cost_prior_steps", "reset_distance", "reset_distance_end", above=0.0
         )
         self._settle_by(number, "averaging", at_least=0.0, at_most=1.0)
+
+    def _settle_by(self, check: Callable[..., Any], *names: str, **bounds: Any) -> None:
+        """Sets fields to their checked values."""
+        self._settle(**{name: check(name, getattr(self, name), **bounds) for name in names})
 
     @property
     def processing(self) -> Bilinear:

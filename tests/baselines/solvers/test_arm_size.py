@@ -43,6 +43,7 @@ def test_weights_are_those_of_the_components(task):
 @pytest.mark.parametrize(
     ("policy", "parameters"),
     [
+        ("jacobian_transpose", {}),
         ("fixed_point", {}),
         ("abstract_rotation", {"deformation": "contraction", "counter_rotation": "none"}),
     ],

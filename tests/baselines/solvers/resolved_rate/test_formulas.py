@@ -5,9 +5,12 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.solvers.arm_size import error_weights
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, DEFICIENT
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
+from baselines.solvers.resolved_rate.gram_schmidt import GramSchmidt, orthonormal_rows
+from baselines.solvers.resolved_rate.jacobian_transpose import JacobianTranspose, transpose_rows
 from baselines.solvers.resolved_rate.null_space import move_rows, objective_rows
 from baselines.status import Status
 from tests.baselines.solvers.adaptive.arms import observed
@@ -17,10 +20,15 @@ from tests.limited import limited
 
 def invert(policy, jacobian, shift):
     """Joint shifts (B, n) for task shifts (B, e), and statuses (B,)."""
-    rows, _, n = jacobian.shape
+    rows, size, n = jacobian.shape
     numbers, out, deficient = policy.numbers(), np.empty((rows, n)), np.zeros(rows, dtype=np.bool_)
     if isinstance(policy, DampedLeastSquares):
         damped_rows(jacobian, shift, numbers.damping, out)
+    elif isinstance(policy, GramSchmidt):
+        orthonormal_rows(jacobian, shift, numbers.truncation, numbers.full_rank, out, deficient)
+    elif isinstance(policy, JacobianTranspose):
+        transpose_rows(jacobian, shift, numbers.weights, numbers.tolerance, out, deficient)
+        deficient &= size == numbers.full_rank
     else:
         pseudoinverse_rows(jacobian / numbers.root, shift, numbers.tolerance, numbers.full_rank, out, deficient)
         out /= numbers.root
@@ -68,16 +76,26 @@ def damped(j, dx, policy):
     return np.linalg.lstsq(augmented, np.concatenate([dx, np.zeros(n)]), rcond=None)[0], True, 1e-8
 
 
+def best_step(j, dx, policy):
+    """The exact line search along the weighted gradient, by least squares in one unknown."""
+    w = np.sqrt(error_weights(policy.problem.task, policy.length))
+    j, dx = w[:, None] * j, w * dx
+    best = np.linalg.lstsq((j @ j.T @ dx)[:, None], dx, rcond=None)[0][0]
+    return best * j.T @ dx, True, 1e-12
+
+
 #: Joint shifts by NumPy, whether the Jacobian has its full rank, and a tolerance.
 FORMULAS = {
     "moore_penrose": lambda j, dx, policy: pseudoinverse(j, dx, policy, 1e-12, 1.0),
     "truncated_svd": lambda j, dx, policy: pseudoinverse(j, dx, policy, policy.threshold, 1.0),
     "weighted_pseudoinverse": lambda j, dx, policy: pseudoinverse(j, dx, policy, 1e-12, np.sqrt(policy.weights)),
     "dls": damped,
+    "jacobian_transpose": best_step,
 }
 CASES = [
     *[("moore_penrose", {}), ("truncated_svd", {"threshold": 1e-3}), ("truncated_svd", {"threshold": 0.3})],
     *[("dls", {"damping": 1e-6}), ("dls", {"damping": 0.5}), ("weighted_pseudoinverse", None)],
+    ("jacobian_transpose", {}),
 ]
 
 
@@ -93,6 +111,25 @@ def test_is_the_formula(policy, parameters, name):
         wanted, full, tolerance = FORMULAS[policy](j, dx, made)
         np.testing.assert_allclose(dq, wanted, atol=tolerance * np.linalg.norm(wanted) + 1e-17)
         assert s == (Status.APPLIED if full else Status.RANK_DEFICIENT)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_full_rank_without_truncation_is_moore_penrose(name):
+    scenario = ikgym.scenarios.get(name)
+    jacobian, shift = jacobians(scenario)
+    if scenario.task.name == "matrix":
+        # Redundant coordinates: of a demand that the arm cannot meet the two make different things.
+        motion = np.random.default_rng(1).normal(size=(len(jacobian), scenario.joints)) * 1e-3
+        shift = np.einsum("ben,bn->be", jacobian, motion)
+    policy, compared = baselines.make("gram_schmidt", scenario, truncation=0.0), 0
+    for j, dx, dq, s in zip(jacobian, shift, *invert(policy, jacobian, shift), strict=True):
+        sigma = np.linalg.svd(j, compute_uv=False)
+        if sigma[policy.full_rank - 1] >= 1e-6 * sigma[0]:
+            wanted, _, tolerance = pseudoinverse(j, dx, policy, 1e-10, 1.0)
+            np.testing.assert_allclose(dq, wanted, atol=10.0 * tolerance * np.linalg.norm(wanted))
+            assert s == Status.APPLIED
+            compared += 1
+    assert compared >= 20
 
 
 @pytest.mark.parametrize("gain", [0.1, 1.5])
@@ -114,6 +151,55 @@ def test_gain_is_the_share_of_the_error_taken_back(gain):
     after, _ = error(away, error(here)[1])
     before = target - scenario.task.coordinates(*scenario.model.forward(away))
     np.testing.assert_allclose(after, (1 - gain) * before, atol=1e-8)
+
+
+def test_makes_the_shift_where_rows_are_nearly_parallel():
+    """To rounding of the large step that this takes; taken off once only, rows would miss by ten million times that."""
+    policy = baselines.make("gram_schmidt", "varga7-fast", truncation=0.0)
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        j, dx = rng.normal(size=7) + 1e-7 * rng.normal(size=(6, 7)), rng.normal(size=6)
+        step, _ = invert(policy, j[None], dx[None])
+        np.testing.assert_allclose(j @ step[0], dx, atol=1e-15 * np.linalg.norm(j, 2) * np.linalg.norm(step))
+
+
+def rank_two():
+    return np.array([[2.0, 0, 0], [0, 3, 0], [2, 3, 1e-5]])
+
+
+def test_rows_left_out_are_not_tracked_and_the_others_are():
+    policy = baselines.make("gram_schmidt", "faitli3-regular", truncation=1e-3)
+    dx = np.array([1.0, 2.0, 30.0])
+    step, status = invert(policy, rank_two()[None], dx[None])
+    assert status[0] == Status.RANK_DEFICIENT
+    # The longest row is the third, then the second of what remains; the first is left out.
+    made = rank_two() @ step[0]
+    np.testing.assert_allclose(made[1:], dx[1:], rtol=1e-12)
+    assert abs(made[0] - dx[0]) > 1
+    exact, status = invert(
+        baselines.make("gram_schmidt", "faitli3-regular", truncation=1e-7), rank_two()[None], dx[None]
+    )
+    assert status[0] == Status.APPLIED
+    np.testing.assert_allclose(rank_two() @ exact[0], dx, rtol=1e-9)
+
+
+def test_stands_still_and_says_so_where_nothing_pulls():
+    policy = baselines.make("jacobian_transpose", "faitli3-regular")
+    jacobian = np.zeros((3, 3, 3))
+    jacobian[:, :2] = np.eye(3)[:2]
+    shift = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    step, status = invert(policy, jacobian, shift)
+    np.testing.assert_array_equal(step, [[0, 0, 0], [0, 0, 0], [1, 0, 0]])
+    assert status.tolist() == [Status.RANK_DEFICIENT, Status.APPLIED, Status.APPLIED]
+
+
+def test_a_best_fit_of_redundant_coordinates_has_lost_no_rank():
+    policy = baselines.make("jacobian_transpose", "khan8-q1", length=1.0)
+    jacobian = np.random.default_rng(0).normal(size=(1, 12, 8))
+    across = np.linalg.svd(jacobian[0])[0][:, -1:].T
+    step, status = invert(policy, jacobian, across)
+    np.testing.assert_array_equal(step, 0.0)
+    assert status[0] == Status.APPLIED
 
 
 def weighted(scenario, **parameters):
