@@ -7,6 +7,8 @@ STAMP := $(VENV)/.installed
 DEMO := moore_penrose truncated_svd dls null_space full_orientation mfac rhc_gradient rhc rhc_foresight follow_nominal
 FUZZ := 20000
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
+# Each process that tests start would compile hundreds of modules anew.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help setup demo test slow fuzz check format lint types layers docs bench rivals clean
 
@@ -46,12 +48,11 @@ types: $(STAMP) ## Check types
 layers: $(STAMP) ## Check the imports between layers
 	$(BIN)/lint-imports
 
-check: ## All that CI runs: format, lint, types, layers, tests, slow tests
+check: $(STAMP) ## All that CI runs: format, lint, types, layers, tests, slow tests
 	$(MAKE) --no-print-directory lint
 	$(MAKE) --no-print-directory types
 	$(MAKE) --no-print-directory layers
-	$(MAKE) --no-print-directory test
-	$(MAKE) --no-print-directory slow
+	$(PYTEST)
 
 docs: results/demo/report.html ## Build the documentation as a site in results/site; a broken link or reference fails
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

@@ -12,6 +12,11 @@ settings.register_profile("ikgym", deadline=None, derandomize=True, database=Non
 settings.load_profile("ikgym")
 
 
+def pytest_collection_modifyitems(items):
+    """Slow tests begin first: workers share out what is left, and one that began last would be waited for."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def optima_of_our_own(tmp_path_factory):
     """Tests neither read nor fill the user's folder of optima."""

@@ -7,6 +7,7 @@ import os
 
 import gymnasium as gym
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -54,7 +55,10 @@ SEEDS = st.one_of(st.none(), st.integers(0, 2**40), st.integers(), FLOATS, st.te
 REFUSED = (IkgymError, gym.error.Error)
 
 
-ENVS = [ikgym.RedundantIKEnv(SCENARIO) for _ in range(2)]  # a refused call must not distinguish them
+@pytest.fixture(scope="module")
+def envs():
+    """Two, which a refused call must not distinguish."""
+    return ikgym.RedundantIKEnv(SCENARIO), ikgym.RedundantIKEnv(SCENARIO)
 
 
 def checked(env, returned):
@@ -75,9 +79,9 @@ def one_line(error):
 
 @fuzz
 @given(ACTIONS)
-def test_any_action_is_a_step_or_an_error_that_changes_nothing(action):
-    env, twin = ENVS
-    for each in ENVS:
+def test_any_action_is_a_step_or_an_error_that_changes_nothing(envs, action):
+    env, twin = envs
+    for each in envs:
         each.reset(seed=5)
     try:
         returned = env.step(action)
@@ -92,9 +96,9 @@ def test_any_action_is_a_step_or_an_error_that_changes_nothing(action):
 
 @fuzz
 @given(SEEDS, OPTIONS)
-def test_any_reset_begins_an_episode_or_changes_nothing(seed, options):
-    env, twin = ENVS
-    for each in ENVS:
+def test_any_reset_begins_an_episode_or_changes_nothing(envs, seed, options):
+    env, twin = envs
+    for each in envs:
         each.reset(seed=5)
         each.step(GOOD)
     try:

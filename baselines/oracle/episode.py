@@ -22,7 +22,7 @@ from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, read_only, whole_number
 
 # Knots at the beginning that a coarse grid has, too: an arm that starts far off its trajectory gets there in a few.
 FIRST = 8
@@ -89,7 +89,7 @@ class EpisodeProblem:
             scenario.dt,
             scenario.arm.lower,
             scenario.arm.upper,
-            scenario.largest_qdot,
+            read_only(scenario.largest_qdot),
         )
         at = np.flatnonzero(scenario.counted())
         held = np.diff(at, prepend=0)
@@ -102,9 +102,10 @@ class EpisodeProblem:
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""
         change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
-        rest = np.zeros_like(self.start)
+        # Writable arrays are another type to numba, for which it would compile once more all that `rhc` calls.
+        limit, rest = read_only(change), np.zeros_like(self.start)
         load, clearance = self._load(grid), self.clearance
-        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, change, False, load, clearance)
+        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, limit, False, load, clearance)
 
     def _load(self, grid: Grid) -> FloatArray:
         """Offset of the joint zeros by the payload at the knots; (0, n) where there is none. Shape (K, n)."""

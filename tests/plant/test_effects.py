@@ -39,7 +39,12 @@ class Played:
         return self.scenario.task.coordinates(*arm.forward(self.true_q if q is None else q))
 
 
-IDEAL = Played(Plant())
+@pytest.fixture(scope="module")
+def ideal():
+    """Of the arm in the data sheet."""
+    return Played(Plant())
+
+
 #: What the sensors alone do leaves the motion and its cost as they are.
 SENSORS = {
     "q_noise": 1e-4,
@@ -53,13 +58,13 @@ SENSORS = {
 
 
 @pytest.mark.parametrize("name", SENSORS)
-def test_sensors_change_what_is_seen_and_nothing_else(name):
+def test_sensors_change_what_is_seen_and_nothing_else(name, ideal):
     played = Played(Plant(**{name: SENSORS[name]}))
-    assert identical(played.true_q, IDEAL.true_q)
-    assert identical(played.told, IDEAL.told)
+    assert identical(played.true_q, ideal.true_q)
+    assert identical(played.told, ideal.told)
     other = "q" if name.startswith("q") else "pose"
     for key in ("q", "qdot", "pose", "nominal", "remaining"):
-        assert identical(played.of(key), IDEAL.of(key)) is (key != other)
+        assert identical(played.of(key), ideal.of(key)) is (key != other)
     assert ("pose_age" in played.seen[0]) is ("q_age" in played.seen[0]) is (name not in {*SENSORS} - LATE)
 
 
@@ -107,13 +112,13 @@ def test_late_encoders():
 
 
 @pytest.mark.parametrize(("every", "delay"), [(1, 5), (7, 0), (7, 3), (3, 7), (4, 8), (1, STEPS), (STEPS + 5, 2)])
-def test_a_slow_and_late_camera(every, delay):
+def test_a_slow_and_late_camera(every, delay, ideal):
     """The newest measurement that has arrived, of the steps 0, E, 2 E, …"""
     played = Played(Plant(pose_every=every, pose_delay=delay))
     steps = np.arange(STEPS + 1)
     newest = np.maximum((steps - delay) // every * every, 0)
     assert identical(played.of("pose_age")[:, 0], (steps - newest).astype(float))
-    assert identical(played.of("pose"), IDEAL.of("pose")[newest])
+    assert identical(played.of("pose"), ideal.of("pose")[newest])
     assert not played.of("q_age").any()
 
 
@@ -130,23 +135,56 @@ def test_missing_poses():
     assert never.of("pose_age")[-1] == STEPS
 
 
-def test_kinematics_are_those_of_the_drawn_arm():
+def test_kinematics_are_those_of_the_drawn_arm(ideal):
     """In the pose that is seen, and in errors and costs."""
     plant = Plant(zero=5e-3, link=1e-3, axis=5e-3, payload=0.01, payload_step=20)
     played = Played(plant)
-    moved, usual = (np.array(one.true_q) - one.true_q[0] for one in (played, IDEAL))
+    moved, usual = (np.array(one.true_q) - one.true_q[0] for one in (played, ideal))
     np.testing.assert_allclose(moved, usual, atol=1e-14)  # from another start, that of the arm that moves
     drawn = played.scenario.drawn_plant(3)
     before, after = played.poses(drawn.arm), played.poses(drawn.loaded_arm)
     wanted = np.concatenate([before[:20], after[20:]])
     assert identical(played.of("pose"), wanted)
-    assert np.abs(wanted - IDEAL.of("pose")).max() > 2e-3
+    assert np.abs(wanted - ideal.of("pose")).max() > 2e-3
     nominal = played.scenario.nominal(3)[1:]
     errors = np.linalg.norm((nominal - wanted[1:])[:, 9:], axis=1)
     np.testing.assert_allclose(played.told_of("position_error"), errors, rtol=1e-12)
     task, cost = played.scenario.task, played.scenario.cost
     costs = [cost.tracking(task.error(*pair)) for pair in zip(nominal, wanted[1:], strict=True)]
     np.testing.assert_allclose(played.told_of("tracking_cost"), costs, rtol=1e-9)
+
+
+def test_a_command_comes_late(ideal):
+    played = Played(Plant(command_delay=5))
+    assert identical(np.array(played.true_q)[:6], np.tile(played.true_q[0], (6, 1)))
+    assert identical(played.of("qdot")[5:], ideal.of("qdot")[:-5])
+    np.testing.assert_allclose(np.array(played.true_q)[5:], np.array(ideal.true_q)[:-5], rtol=0, atol=1e-15)
+
+
+def test_a_drive_lags_behind_its_command():
+    """The answer to a step; what is observed and charged is the command."""
+    played = Played(Plant(bandwidth=15.0), command=lambda k: np.full(7, 0.003))  # within the limits of acceleration
+    asked = 0.003 * played.scenario.velocity_limit
+    velocity = np.diff(played.true_q, axis=0) / played.scenario.dt
+    k = np.arange(1, STEPS + 1)[:, None]
+    time_constant = 1.0 / (2.0 * np.pi * 15.0)
+    np.testing.assert_allclose(velocity, asked * (1.0 - np.exp(-k * played.scenario.dt / time_constant)), rtol=1e-6)
+    straight = Played(Plant(), command=lambda k: np.full(7, 0.003))
+    assert identical(played.of("qdot"), straight.of("qdot"))
+    assert identical(played.told_of("velocity_cost"), straight.told_of("velocity_cost"))
+
+
+def test_backlash_is_lost_where_a_drive_turns():
+    """Half of it at the start, all of it where the direction changes."""
+    there, back = np.full(7, 0.01), np.full(7, -0.01)
+    played, free = (
+        Played(plant, command=lambda k: there if k < 30 else back) for plant in (Plant(backlash=1e-4), Plant())
+    )
+    way, wanted = (np.array(one.true_q) - one.true_q[0] for one in (played, free))
+    np.testing.assert_allclose(way[30], wanted[30] - 0.5e-4, atol=1e-12)
+    np.testing.assert_allclose(way[-1] - way[30], wanted[-1] - wanted[30] + 1e-4, atol=1e-12)
+    assert identical(played.of("q"), np.array(played.true_q))
+    assert identical(played.of("qdot"), free.of("qdot"))
 
 
 def test_commands_are_shown_newest_first():

@@ -10,6 +10,10 @@ from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid, first_knots
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from ikgym import TrackingCost
+from ikgym.validation import read_only
+
+#: No limit of accelerations. What a policy has read-only is so here: kernels are compiled once for both.
+UNLIMITED = read_only(np.zeros(0))
 
 
 def grid_of(at, steps=None, terminal=1.0) -> Grid:
@@ -34,7 +38,7 @@ class Place:
 
     @property
     def problem(self):
-        return PathProblem(self.data, self.grid, self.start, self.nominal)
+        return PathProblem(self.data, self.grid, self.start, self.nominal, change_limit=UNLIMITED)
 
     @property
     def workspace(self):
@@ -72,5 +76,6 @@ def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, 
         multipliers[:, e:] = rng.normal(size=(knots, 2 * n)) * (rng.random((knots, 2 * n)) < 0.5)
         multipliers[:, e : e + n] *= 100.0
         multipliers[:, e + n :] *= 100.0 / dt
-    data = ProblemData(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, lower, upper, speed)
+    limits = map(read_only, (lower, upper, speed))
+    data = ProblemData(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, *limits)
     return Place(data, grid, start, nominal, path, multipliers, e, task.size)

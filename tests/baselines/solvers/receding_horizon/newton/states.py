@@ -11,6 +11,7 @@ from baselines.solvers.receding_horizon.newton.interior_point import minimise_li
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from benchmarks.rivals.numpy_horizon import Horizon
+from ikgym.validation import read_only
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 
 #: Knots, one a step of 2 ms.
@@ -67,13 +68,14 @@ def horizon_of(problem: Problem, state: State, knots=KNOTS, at=None) -> Horizon:
 def path_problem(problem: Problem, horizon: Horizon, braking=True) -> PathProblem:
     """A horizon as the kernels see it."""
     arm, at = problem.model, np.cumsum(horizon.lengths).astype(int)
-    data = ProblemData(
-        arm.chain, problem.task.kind, problem.cost.parameters, DT, arm.lower, arm.upper, problem.largest_qdot
-    )
+    # Read-only where a policy's are: kernels are compiled once for both.
+    fastest, change = read_only(problem.largest_qdot), read_only(DT * arm.acceleration_limit)
+    data = ProblemData(arm.chain, problem.task.kind, problem.cost.parameters, DT, arm.lower, arm.upper, fastest)
     nominal = np.zeros((at[-1], problem.task.size))
     nominal[at - 1] = horizon.nominal
-    change = DT * arm.acceleration_limit
-    return PathProblem(data, grid_of(at), horizon.q, nominal, horizon.qdot_before, 0.0, change, braking)
+    return PathProblem(
+        data, grid_of(at), np.array(horizon.q), nominal, np.array(horizon.qdot_before), 0.0, change, braking
+    )
 
 
 def solved(problem: Problem, horizon: Horizon, path=None, braking=True, exact=True, steps=300, tolerance=1e-8):

@@ -14,7 +14,8 @@ from baselines.solvers.receding_horizon.newton.workspace import PathProblem, new
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.kernels import tasks as task_kernels
-from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
+from ikgym.validation import read_only
+from tests.baselines.solvers.receding_horizon.newton.problems import UNLIMITED, grid_of
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
 
@@ -71,16 +72,16 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     arm = Arm("slider", np.zeros((1, 3)), [[1.0, 0.0, 0.0]], (True,))
     task = ikgym.tasks.get("position")
     cost = TrackingCost(delta_x=S, p_x=3.0, delta_qdot=1.0, p_out=2.0, p_in=2.0)
-    data = ProblemData(
-        arm.chain, task.kind, cost.parameters, S, np.array([-np.inf]), np.array([upper * S]), np.array([speed])
-    )
+    limits = (read_only(np.array([limit])) for limit in (-np.inf, upper * S, speed))
+    data = ProblemData(arm.chain, task.kind, cost.parameters, S, *limits)
     goals = np.atleast_1d(goals)
     grid = grid_of(range(1, len(goals) + 1), terminal=weight)
     nominal = np.zeros((len(goals), 3))
     nominal[:, 0] = goals * S
     path, multipliers = np.zeros((len(goals), 1)), np.zeros((len(goals), 5))
     workspace = newton_workspace(task.kind, task.size, len(goals), 1)
-    problem, settings = PathProblem(data, grid, np.zeros(1), nominal), NewtonSettings(True, most, tolerance)
+    problem = PathProblem(data, grid, np.zeros(1), nominal, change_limit=UNLIMITED)
+    settings = NewtonSettings(True, most, tolerance)
     outcome, made, value, slope = minimise(problem, path, multipliers, settings, workspace)
     true = true_cost(problem, path, workspace)
     return path[:, 0] / S, multipliers, outcome, made, value, slope, true
