@@ -35,6 +35,7 @@ EPISODES = [
         for one in (
             short("varga7-random").replace(plant=NOISE),
             short("khan8-q1", 130),
+            short("panda-clutter-random"),  # obstacles that are drawn
             limited(),
             limited(plant=NOISE),
         )

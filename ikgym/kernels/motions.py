@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.kernels.jit import inlined, kernel, uncounted
-from ikgym.kernels.kinematics import Chain, forward
+from ikgym.kernels.kinematics import forward
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -19,7 +19,19 @@ TINY = 1e-12
 
 
 class Motions(NamedTuple):
-    """Motions of N episodes, and the points of them that a step needs; see :func:`complete`."""
+    """Motions of N episodes, and the points of them that a step needs.
+
+    Attributes:
+        control: The rows' motions, see :func:`motion_rows`. Shape (N, c, n).
+        duration: See there.
+        dt: Δt in [s].
+        first: Number of the first point of the rows' episodes, all points of all their episodes being counted on.
+            Shape (N,).
+        point: Number of the target after k steps, from the first one of an episode. Shape (steps + furthest
+            preview + 1,).
+        preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
+        known: Numbers of the points whose frames are in the tables, changed in place. Shape (N, slots).
+    """
 
     control: Floats
     duration: float
@@ -27,6 +39,7 @@ class Motions(NamedTuple):
     first: Integers
     point: Integers
     preview: Integers
+    known: Integers
 
 
 @inlined
@@ -118,51 +131,13 @@ def control_rows(drawn, lower, upper, fastest, hardest, low, high, out):
 
 
 @kernel
-def complete(
-    # Chain of the model.
-    offsets,
-    axes,
-    prismatic,
-    tool,
-    tool_rotation,
-    # The motions.
-    control,
-    duration,
-    dt,
-    first,
-    point,
-    preview,
-    # The tables, changed in place.
-    known,
-    tables,
-    # The command.
-    made,
-    active,
-    moving,
-    count,
-    start,
-    stop,
-):
+def complete(chain, motions, tables, made, active, moving, count, start, stop):
     """Computes the nominal frames that rows need in their next steps and that are not in their tables yet.
 
-    The tuples are taken apart for the reason of :func:`ikgym.kernels.simulation.step`, before which this is called.
-
     Args:
-        offsets: Of the model's :class:`Chain`, as the next four.
-        axes: See there.
-        prismatic: See there.
-        tool: See there.
-        tool_rotation: See there.
-        control: The rows' motions, see :func:`motion_rows`. Shape (N, c, n).
-        duration: See there.
-        dt: Δt in [s].
-        first: Number of the first point of the rows' episodes, all points of all their episodes being counted on.
-            Shape (N,).
-        point: Number of the target after k steps, from the first one of an episode. Shape (steps + furthest
-            preview + 1,).
-        preview: How many steps ahead the nominal coordinates are shown. Shape (p,).
-        known: Numbers of the points whose frames are in the tables. Shape (N, slots).
-        tables: The frames. Shape (N, slots, 12 or 3).
+        chain: Of the model, a :class:`ikgym.kernels.kinematics.Chain`.
+        motions: A :class:`Motions`.
+        tables: The frames, changed in place. Shape (N, slots, 12 or 3).
         made: Steps made in the episodes. Shape (N,).
         active: The rows that are meant. Shape (N,).
         moving: Whether they are about to move, or are observed where they are.
@@ -170,31 +145,28 @@ def complete(
         start: The first row.
         stop: The row after the last.
     """
-    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
-    motions = Motions(control, duration, dt, first, point, preview)
-    q, frame = np.empty(control.shape[2]), np.empty(12)
-    _rows(chain, motions, known, tables, q, frame, made, active, moving, count, start, stop)
+    q, frame = np.empty(motions.control.shape[2]), np.empty(12)
+    _rows(chain, motions, tables, q, frame, made, active, 1 if moving else 0, count, start, stop)
 
 
 @uncounted
-def _rows(chain, motions, known, tables, q, frame, made, active, moving, count, start, stop):
+def _rows(chain, motions, tables, q, frame, made, active, next_step, count, start, stop):
     """The rows of :func:`complete`, with its scratch."""
-    rotation, position, next_step = frame[:9].reshape(3, 3), frame[9:], 1 if moving else 0
     point, preview = motions.point, motions.preview
     steps = point.shape[0] - 1 - preview[preview.shape[0] - 1]
     for row in range(start, stop):
         if active[row]:
             k = made[row] + next_step
             for step in range(k, min(k + count, steps + 1)):
-                _complete(chain, motions, row, point[step], known[row], tables[row], q, rotation, position)
+                _complete(chain, motions, row, point[step], tables[row], q, frame)
                 for i in range(preview.shape[0]):
-                    at = point[step + preview[i]]
-                    _complete(chain, motions, row, at, known[row], tables[row], q, rotation, position)
+                    _complete(chain, motions, row, point[step + preview[i]], tables[row], q, frame)
 
 
 @inlined
-def _complete(chain, motions, row, point, known, table, q, rotation, position):
+def _complete(chain, motions, row, point, table, q, frame):
     """The frame of one point of a row, if its table does not have it."""
+    known, rotation, position = motions.known[row], frame[:9].reshape(3, 3), frame[9:]
     slot, number = point % known.shape[0], motions.first[row] + point
     if known[slot] == number:
         return

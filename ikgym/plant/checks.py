@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -42,9 +44,7 @@ def frequency(name: str, value: Any) -> Drawn:
     """
     if isinstance(value, float) and value == math.inf:
         return math.inf
-    ends = _ends(name, value, "numbers above 0")
-    low, high = (number(name, end, above=0.0, at_most=LARGEST) for end in ends)
-    return _range(name, low, high, value)
+    return _drawn(name, value, "numbers above 0", functools.partial(number, above=0.0, at_most=LARGEST))
 
 
 def numbers(name: str, value: Any) -> Drawn:
@@ -53,21 +53,7 @@ def numbers(name: str, value: Any) -> Drawn:
     Raises:
         InvalidInputError: It is neither, or the range is the wrong way round.
     """
-    ends = _ends(name, value, "numbers of at least 0")
-    low, high = (number(name, end, at_least=0.0, at_most=LARGEST) for end in ends)
-    return _range(name, low, high, value)
-
-
-def shares(name: str, value: Any) -> tuple[float, float]:
-    """Two different shares, the smaller one first.
-
-    Raises:
-        InvalidInputError: They are no such shares.
-    """
-    near, far = (share(name, end) for end in _ends(name, value, "shares"))
-    if near >= far:
-        raise InvalidInputError(f"{name}: expected two shares (near, far) with near < far, got {value!r}.")
-    return near, far
+    return _drawn(name, value, "numbers of at least 0", functools.partial(number, at_least=0.0, at_most=LARGEST))
 
 
 def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
@@ -76,8 +62,20 @@ def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
     Raises:
         InvalidInputError: It is neither, or the range is the wrong way round.
     """
-    low, high = (whole_number(name, end, at_least=at_least) for end in _ends(name, value, "whole numbers"))
-    return _range(name, low, high, value)  # type: ignore[return-value]  # whole numbers come as such
+    drawn: Any = _drawn(name, value, "whole numbers", functools.partial(whole_number, at_least=at_least))
+    return drawn  # type: ignore[no-any-return]  # whole numbers come as such
+
+
+def shares(name: str, value: Any) -> tuple[float, float]:
+    """Two different shares, the smaller one first.
+
+    Raises:
+        InvalidInputError: They are no such shares.
+    """
+    drawn = _drawn(name, value, "shares", share)
+    if not isinstance(drawn, tuple) or drawn[0] == drawn[1]:
+        raise InvalidInputError(f"{name}: expected two shares (near, far) with near < far, got {value!r}.")
+    return drawn
 
 
 def share(name: str, value: Any) -> float:
@@ -89,16 +87,13 @@ def share(name: str, value: Any) -> float:
     return number(name, value, at_least=0.0, at_most=1.0)
 
 
-def _ends(name: str, value: Any, meant: str) -> tuple[Any, Any]:
-    """The ends of a range; those of a single number are the number itself."""
+def _drawn(name: str, value: Any, meant: str, check: Callable[[str, Any], float]) -> Drawn:
+    """A number, or a range (low, high), each end of which a check takes."""
     if not isinstance(value, (tuple, list, np.ndarray)):
-        return value, value
+        return check(name, value)
     if len(value) != 2:
         raise InvalidInputError(f"{name}: expected one number or a range (low, high) of {meant}, got {value!r}.")
-    return value[0], value[1]
-
-
-def _range(name: str, low: float, high: float, value: Any) -> float | tuple[float, float]:
+    low, high = (check(name, end) for end in value)
     if low > high:
         raise InvalidInputError(f"{name}: expected a range (low, high) with low <= high, got {value!r}.")
-    return (low, high) if isinstance(value, (tuple, list, np.ndarray)) else low
+    return low, high

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.motions import Motions
 from ikgym.parallel import in_chunks
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import JointMotions, Trajectory
@@ -109,11 +110,10 @@ class MotionFrames:
         self._motions.parameters[rows] = episodes.parameters  # type: ignore[attr-defined]  # JointMotions
         self._first[rows] += self._points
 
-    def arguments(self) -> tuple[Any, ...]:
+    def arguments(self) -> tuple[Chain, Motions]:
         """The first arguments of the kernel."""
-        motions, scenario = self._motions, self._scenario
-        shown = motions.parameters, motions.duration, scenario.dt, self._first, self.point, self._preview, self._known
-        return *scenario.model.chain, *shown
+        motions, own = self._motions, (self._first, self.point, self._preview, self._known)
+        return self._scenario.model.chain, Motions(motions.parameters, motions.duration, self._scenario.dt, *own)
 
     def positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""

@@ -141,15 +141,6 @@ def test_wrappers_of_gymnasium(name):
     assert np.abs(seen).max() < 10.0
 
 
-@every_id
-def test_torchrl_takes_it(name):
-    check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
-    from torchrl.envs import GymEnv, GymWrapper
-
-    check_env_specs(GymEnv(name))
-    check_env_specs(GymWrapper(gym.make_vec(name, 2, autoreset_mode="SameStep")))
-
-
 @one_id_at_least
 def test_spawned_workers_return_what_one_process_does(name):
     makers = [functools.partial(gym.make, f"ikgym:{name}")]
