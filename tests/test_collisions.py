@@ -84,24 +84,6 @@ def test_an_arm_that_is_stopped_pays_to_the_end(scenario):
     assert max(rewards[first:]) < 0.0
 
 
-def test_one_arm_many_in_a_loop_and_many_at_once_agree():
-    plant = Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
-    crowd = among(person()).replace(plant=plant)
-    vectors = [
-        gym.make_vec("RedundantIK-v0", num_envs=5, scenario=crowd, vectorization_mode=mode)
-        for mode in ("sync", "vector_entry_point")
-    ]
-    seen = [envs.reset(seed=3)[0] for envs in vectors]
-    for action in wild(5, 200):
-        results = [envs.step(action) for envs in vectors]
-        for key in seen[0]:
-            np.testing.assert_array_equal(results[0][0][key], results[1][0][key])
-        for key in ("clearance", "collision"):
-            np.testing.assert_array_equal(results[0][4][key], results[1][4][key])
-    assert results[0][4]["collision"].any()
-    assert results[0][0]["obstacles"].shape == (5, 5, 16)
-
-
 def test_obstacles_are_shown_as_they_will_be_after_the_step(scenario):
     way = line([0.4, 0, 0], 0.4)
     crowd = scenario.replace(obstacles=[Sphere("ball", [-1, 0, 1], 0.1, motion=way)])

@@ -10,11 +10,13 @@ from baselines.evaluate import evaluate
 from baselines.fingerprints import fingerprint
 from baselines.oracle.episode import EpisodeProblem
 from ikgym.exceptions import InvalidInputError
+from tests.comparison import identical
 from tests.test_collisions import among, person, wild
 
 # Two bodies of the arm are always 15 mm apart.
 NEAR = ikgym.ProximityCost(0.014, 0.005, 3.0, 1.5)
-CROWD = among(person()).replace(iterations_per_point=2)
+PLANT = ikgym.Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
+CROWD = among(person()).replace(iterations_per_point=2, plant=PLANT)
 
 
 def depth_cost(clearance):
@@ -30,9 +32,11 @@ def test_one_arm_many_in_a_loop_and_many_at_once_pay_what_the_formula_says():
     [envs.reset(seed=3) for envs in vectors]
     paid = []
     for k, action in enumerate(wild(5, 200), start=1):
-        (_, loop, _, _, info), (_, native, _, _, infos) = [envs.step(action) for envs in vectors]
+        (seen, loop, _, _, info), (others, native, _, _, infos) = [envs.step(action) for envs in vectors]
+        assert identical(seen, others)
         np.testing.assert_array_equal(loop, native)
-        np.testing.assert_array_equal(info["proximity_cost"], infos["proximity_cost"])
+        for key in ("clearance", "collision", "proximity_cost"):
+            np.testing.assert_array_equal(info[key], infos[key])
         expected = [depth_cost(one) if k % 2 == 0 else 0.0 for one in infos["clearance"]]
         np.testing.assert_allclose(infos["proximity_cost"], expected, rtol=1e-12)
         total = infos["tracking_cost"] + infos["velocity_cost"] + infos["proximity_cost"]

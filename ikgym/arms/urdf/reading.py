@@ -97,9 +97,9 @@ def from_urdf(
             [joint.kind == "prismatic" for joint in moving],
             tool=home.position - home.points[-1],
             tool_rotation=home.rotation,
-            lower=[joint.lower for joint in moving],
-            upper=[joint.upper for joint in moving],
-            velocity_limit=[joint.velocity for joint in moving],
+            lower=np.array([joint.lower for joint in moving]),
+            upper=np.array([joint.upper for joint in moving]),
+            velocity_limit=np.array([joint.velocity for joint in moving]),
             joint_names=[joint.name for joint in moving],
         )
         file = Path(path).resolve()
