@@ -15,7 +15,8 @@ from tests.test_collisions import among, person, vectors_of, wild
 
 # Two bodies of the arm are always 15 mm apart.
 NEAR = ikgym.ProximityCost(0.014, 0.005, 3.0, 1.5)
-CROWD = among(person()).replace(iterations_per_point=2)
+PLANT = ikgym.Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
+CROWD = among(person()).replace(iterations_per_point=2, plant=PLANT)
 
 
 def depth_cost(clearance):

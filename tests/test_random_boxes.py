@@ -32,12 +32,15 @@ def test_the_motion_keeps_its_distance_from_each_box_and_comes_near_it():
             assert BOXES.margin <= distances.min() <= BOXES.within
 
 
-def test_an_episode_shows_the_boxes_of_its_seed():
-    env = gym.make("RedundantIK-v0", scenario=SCENARIO, preview=1)
-    for seed in (5, 6):
-        seen, _ = env.reset(seed=seed)
-        assert identical(seen["obstacles"], np.array([box.numbers() for box in SCENARIO.obstacles_of(seed)]))
-        assert env.observation_space.contains(seen)
+def test_single_and_vector_environments_draw_the_same_boxes():
+    options = {"scenario": SCENARIO, "preview": 1}
+    native = gym.make_vec("RedundantIK-v0", num_envs=3, **options)
+    first = native.reset(seed=5)[0]["obstacles"]
+    for row in range(3):
+        single = gym.make("RedundantIK-v0", **options).reset(seed=5 + row)[0]["obstacles"]
+        assert identical(first[row], single)
+        assert identical(single, np.array([box.numbers() for box in SCENARIO.obstacles_of(5 + row)]))
+    assert native.observation_space.contains(native.reset(seed=7)[0])
 
 
 def test_other_draws_stay_as_they_are():

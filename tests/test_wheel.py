@@ -37,7 +37,7 @@ def test_it_holds_every_module_and_all_data(content):
         assert f"baselines/data/{file}" in content
     assert "baselines/training/presets.toml" in content
     # The problems of others, and the notices that their licences ask for.
-    for file in ("waypoints.npz", "trajectories.npz", "LICENSE-RL-ITG.txt", "LICENSE-CppFlow.txt"):
+    for file in ("problems.npz", "LICENSE-RL-ITG.txt", "LICENSE-CppFlow.txt"):
         assert f"ikgym/problems/{file}" in content
 
 

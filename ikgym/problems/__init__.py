@@ -15,13 +15,14 @@ network `FREEALL_Task` (`pirl_rl_test_1`). RL-ITG's joint interpolations, which 
 Problems with obstacles, :data:`OBSTRUCTED`, also have upright boxes: of RL-ITG `s`, `square` and
 ``rlitg-obstacle-…``, the first path of each of its hundred scenes `random_obs`; and of CppFlow those of the Panda and
 three of the Fetch, whose starts are not published: they are drawn clear of the boxes, the clearest of thirty-two. Of
-RL-ITG's starts for these problems the first one is kept that is clear by the bodies of our arm. The archives are data;
+RL-ITG's starts for these problems the first one is kept that is clear by the bodies of our arm. The archive is data;
 the programs that read the repositories are in the history of this one.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import pathlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -31,10 +32,8 @@ import numpy.typing as npt
 
 from ikgym.validation import FloatArray, known_name, read_only
 
-FOLDER = pathlib.Path(__file__).parent
-WAYPOINTS, TRAJECTORIES = FOLDER / "waypoints.npz", FOLDER / "trajectories.npz"
-#: All numbers of the problems with obstacles.
-OBSTRUCTED_FILE = FOLDER / "obstructed.npz"
+#: All numbers of all problems.
+FILE = pathlib.Path(__file__).with_name("problems.npz")
 #: One over the resolution of waypoints and starts in [m], [rad] or 1, and of trajectories in [rad]; and the orders of
 #: the differences in which they are stored, which change little from row to row and so compress well.
 FINE, COARSE = 10**6, 10**5
@@ -119,41 +118,42 @@ def boxes(name: str) -> FloatArray:
         UnknownNameError: There is no such problem; the message has the nearest name.
     """
     known_name("problem", name, names())
-    return _boxes().get(name, read_only(np.empty((0, 7))))
+    return _boxes()[name]
+
+
+@functools.cache
+def _archive() -> dict[str, Any]:
+    with np.load(FILE, allow_pickle=False) as archive:
+        return dict(archive)
 
 
 @functools.cache
 def _stored() -> dict[str, Waypoints]:
-    stored, more = _load(WAYPOINTS), _load(OBSTRUCTED_FILE)
-    starts = _parts(stored["starts"] / FINE, stored["start_counts"].tolist())
-    starts += [row[None, :n] for row, n in zip(more["starts"] / FINE, more["joints_of"].tolist(), strict=True)]
-    names = stored["names"].tolist() + more["names"].tolist()
-    poses = [
-        pose
-        for one in (stored, more)
-        for pose in _restored(one["poses"], one["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
-    ]
-    problems = zip(names, poses, starts, strict=True)
-    return {name: Waypoints(*_split(pose), read_only(start)) for name, pose, start in problems}
+    stored, out = _archive(), {}
+    shapes = stored["start_shapes"].tolist()
+    starts = np.split(stored["starts"] / FINE, np.cumsum([math.prod(shape) for shape in shapes])[:-1])
+    poses = _restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
+    for name, pose, start, shape in zip(stored["names"].tolist(), poses, starts, shapes, strict=True):
+        # Rounding is taken off the length of quaternions.
+        quaternions = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+        out[name] = Waypoints(*map(read_only, (pose[:, :3].copy(), quaternions, start.reshape(shape))))
+    return out
 
 
 @functools.cache
 def _boxes() -> dict[str, FloatArray]:
-    stored = _load(OBSTRUCTED_FILE)
-    parts = _parts(stored["boxes"], stored["box_counts"].tolist())
-    return {name: read_only(part) for name, part in zip(stored["names"].tolist(), parts, strict=True)}
+    stored = _archive()
+    parts = np.split(stored["boxes"], np.cumsum(stored["box_counts"])[:-1])
+    return dict(zip(stored["names"].tolist(), map(read_only, parts), strict=True))
 
 
 @functools.cache
 def _trajectories() -> dict[tuple[str, str], FloatArray]:
-    stored, more = _load(TRAJECTORIES), _load(OBSTRUCTED_FILE)
-    out: dict[tuple[str, str], FloatArray] = {}
-    for names, one in ((stored["names"].tolist(), stored), (more["trajectory_names"].tolist(), more)):
-        lengths = [len(_stored()[name].positions) for name in names]
-        keys = zip(names, one["methods"].tolist(), strict=True)
-        paths = _restored(one["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
-        out |= {key: read_only(path) for key, path in zip(keys, paths, strict=True)}
-    return out
+    stored = _archive()
+    keys = list(zip(stored["trajectory_names"].tolist(), stored["methods"].tolist(), strict=True))
+    lengths = [len(_stored()[name].positions) for name, _ in keys]
+    paths = _restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
+    return dict(zip(keys, map(read_only, paths), strict=True))
 
 
 def _restored(packed: npt.NDArray[np.int32], lengths: Sequence[int], scale: int, order: int) -> list[FloatArray]:
@@ -164,18 +164,3 @@ def _restored(packed: npt.NDArray[np.int32], lengths: Sequence[int], scale: int,
             part = np.cumsum(part, axis=0)
         out.append(part / scale)
     return out
-
-
-def _load(file: pathlib.Path) -> dict[str, Any]:
-    with np.load(file, allow_pickle=False) as archive:
-        return dict(archive)
-
-
-def _parts(table: FloatArray, counts: Sequence[int]) -> list[FloatArray]:
-    return [part.copy() for part in np.split(table, np.cumsum(counts)[:-1])]
-
-
-def _split(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions, and quaternions, whose rounding is taken off their length."""
-    quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
-    return read_only(poses[:, :3].copy()), read_only(quaternions)
