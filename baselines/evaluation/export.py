@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.motion import Motion, joint_trajectory, mcap
 from baselines.evaluation.motion.contacts import carried
-from baselines.evaluation.motion.played import by_joint
+from baselines.evaluation.motion.message import joint_trajectory, mcap
+from baselines.evaluation.motion.played import Motion, by_joint
 from baselines.files import csv_text
 from baselines.recording import Episode, Seeds
 from ikgym.exceptions import MissingDependencyError
