@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.motion import Motion, joint_trajectory, mcap
 from baselines.evaluation.motion.contacts import carried
-from baselines.evaluation.motion.played import by_joint
+from baselines.evaluation.motion.message import joint_trajectory, mcap
+from baselines.evaluation.motion.played import Motion, by_joint
 from baselines.files import csv_text
 from baselines.recording import Episode, Seeds
 from ikgym.exceptions import MissingDependencyError
@@ -82,11 +82,10 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
 
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
-        ``position_error`` and, where there is one, ``orientation_error`` (k,); ``nominal_q`` (k, n) where there is a
-        nominal joint path; ``joint_names``; ``prismatic``, which joints are prismatic, and the limits ``lower``,
-        ``upper`` and ``velocity_limit`` of the arm, infinite where there is none, all of shape (n,). If there are
-        limits of acceleration, ``acceleration_limit`` (n,), and ``qddot`` (k, n): the change of q̇ in the step by Δt,
-        from rest.
+        ``position_error`` and, where there is one, ``orientation_error`` (k,); ``joint_names``; ``prismatic``,
+        which joints are prismatic, and the limits ``lower``, ``upper`` and ``velocity_limit`` of the arm, infinite
+        where there is none, all of shape (n,). If there are limits of acceleration, ``acceleration_limit`` (n,), and
+        ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest.
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
@@ -114,9 +113,6 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         start = np.zeros((1, scenario.joints))
         log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
         log["acceleration_limit"] = scenario.arm.acceleration_limit
-    path = scenario.nominal_joint_path(seeds.seed)
-    if path is not None:
-        log["nominal_q"] = path[after]
     frames = frame_rows(len(kept), FRAMES)
     log |= {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
     if episode.clearance is None:

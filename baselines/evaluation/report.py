@@ -25,7 +25,7 @@ TIMING_NOTE = (
     "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
 )
 RATIO_NOTE = "cost ratio: total cost / best known cost, – where none is known"
-TIMES_NOTE = "p50, p99: time of a call after the first, on one thread; misses: such calls longer than Δt"
+TIMES_NOTE = "p50, p99: time of a call after the first; misses: such calls longer than Δt"
 ERRORS_NOTE = (
     "pos, ori: position and orientation error; q̇, q̈ peak: joint velocity and acceleration in rad/s and rad/s², in m/s "
     "and m/s² for prismatic joints"

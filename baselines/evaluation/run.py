@@ -97,6 +97,6 @@ def _finish(results: Results, rows: Rows, options: Options, command: str) -> Non
     text = report.readme(results.rows, rows.skipped, command=command, date=now)
     write(results.directory / "README.md", text.encode())
     if options.report:
-        from baselines.evaluation.html import page
+        from baselines.evaluation.html.page import page
 
         write(results.directory / PAGE, page(results, rows.skipped, command=command, date=now))

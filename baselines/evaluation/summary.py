@@ -65,6 +65,7 @@ def summarise(rows: Iterable[Row]) -> list[dict[str, Any]]:
         plain = [] if first.fingerprint == first.ideal else ideal.get((str(first.ideal), *key[1:]), [])
         out.append(
             record(label, group, np.array([list(values.values())]))
+            | ({} if len(values) > 1 else {"low": None, "high": None})
             | {"quantity": TOTAL if key[0] in unknown else RATIO}
             | {"cost_ratio": geometric_mean([*map(_ratio, group)]) if known else None}
             | _beside_ideal(group, plain)

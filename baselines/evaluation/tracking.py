@@ -14,9 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
-from baselines.evaluation.motion import Motion, joint_trajectory, mcap
 from baselines.evaluation.motion.free_timing import as_long
-from baselines.evaluation.motion.played import by_joint
+from baselines.evaluation.motion.message import joint_trajectory, mcap
+from baselines.evaluation.motion.played import Motion, by_joint
 from baselines.evaluation.play import play_episodes
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy, bind

@@ -85,9 +85,9 @@ const layout = (changes) => ({
 function drawCostTime() {
   const scenario = chosen()[0]?.scenario ?? ENTRIES[0]?.scenario;
   const all = ENTRIES.filter((entry) => entry.scenario === scenario);
-  const ratio = all.every((entry) => entry.quantity === "cost ratio");
+  const ratio = all[0]?.quantity === "cost ratio";
   const height = (value) => (ratio ? Math.max(100 * (value - 1), NEAREST) : Math.max(value, 1e-12));
-  const traces = all.filter((entry) => entry.time !== null && entry.value !== null && (ratio || entry.quantity === "total cost")).map((entry) => {
+  const traces = all.filter((entry) => entry.time !== null && entry.value !== null).map((entry) => {
     const picked = chosen().includes(entry);
     const y = height(entry.value);
     const interval = entry.low === null ? "" : `<br>95 %: ${shown(entry.low)} … ${shown(entry.high)}`;

@@ -26,7 +26,7 @@ COLUMNS = (
     report.RATIO,
     Column(
         *("95 %", "", "low", "interval of the mean cost ratio over the episodes"),
-        text=lambda line: report.interval(line) if line["cost_ratio"] and line["episodes"] > 1 else NOTHING,
+        text=lambda line: report.interval(line) if line["cost_ratio"] else NOTHING,
     ),
     Column(
         *("worst", "", "worst", "largest cost ratio of an episode"),

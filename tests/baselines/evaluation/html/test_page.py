@@ -10,8 +10,7 @@ import pytest
 
 from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
-from baselines.evaluation.html import page
-from baselines.evaluation.html.page import COLUMNS, embedded
+from baselines.evaluation.html.page import COLUMNS, embedded, page
 from baselines.evaluation.jobs import Options, Skipped
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.results import PAGE, Results, read_rows
