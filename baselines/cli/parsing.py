@@ -9,7 +9,7 @@ import pathlib
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import tyro
 
@@ -78,6 +78,20 @@ def varies(scenario: str | Scenario) -> bool:
 def if_random(name: str, scenario: Callable[[Any], str | Scenario] = lambda given: given.scenario) -> Rule:
     """The rule for an option that chooses among the episodes of a scenario."""
     return Rule((name,), lambda given: varies(scenario(given)), "on a scenario that is the same at every reset")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EpisodeOptions:
+    """The episode that a command shows."""
+
+    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
+    """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
+    """Policies side by side, as evaluate takes them."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Reset seed of the episode."""
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Number of steps; all of the scenario if left out."""
 
 
 def find_own_modules() -> None:

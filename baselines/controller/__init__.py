@@ -1,4 +1,4 @@
-"""A policy on a real arm, without an environment: what was measured goes in, joint velocities come out."""
+"""A policy on a real arm, without an environment: measurements go in, joint velocities come out."""
 
 from __future__ import annotations
 

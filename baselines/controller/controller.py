@@ -27,7 +27,7 @@ from ikgym.validation import FloatArray, whole_number
 
 logger = logging.getLogger("ikgym")
 
-#: Steps left where nobody says when the episode ends.
+#: Steps left where no end of the episode is given.
 ENDLESS = 1_000_000
 _DIVERGED = int(Status.DIVERGED)
 #: Calls that :meth:`Controller.warm_up` times.
@@ -51,8 +51,9 @@ class Controller:
     environment. With imperfect drives they are at most 1.25 times as fast as the policy wanted to be within the last
     second, and joints without a limit of acceleration have that of :attr:`Guards.stopping_time`.
 
-    *Guards.* What cannot be right ends in a controlled stop, which lasts until :meth:`reset`, see :class:`Guards` and
-    :attr:`stopped`. Joint coordinates must not jump by 2π: unwrap them. Only arrays of a wrong shape raise an error.
+    *Guards.* Implausible measurements end in a controlled stop, which lasts until :meth:`reset`, see :class:`Guards`
+    and :attr:`stopped`. Joint coordinates must not jump by 2π: unwrap them. Only arrays of a wrong shape raise an
+    error.
 
     Args:
         scenario: Model, task, Δt and velocity limit, as :func:`ikgym.scenarios.find` takes it.
@@ -186,7 +187,7 @@ class Controller:
         return self.policy.report(self._state)
 
     def _speed(self, qdot: npt.ArrayLike) -> FloatArray:
-        """Measured joint velocities, no faster than the arm can be; the first ones are what commands begin with."""
+        """Measured joint velocities, cut to the largest ones; the first command starts from the first of them."""
         fastest = self._problem.largest_qdot
         speed: FloatArray = np.clip(numbers("qdot", qdot, (self._joints,)), -fastest, fastest)
         if self._made == 0 and np.isfinite(speed).all():
@@ -255,6 +256,6 @@ class Controller:
         return spent[1:]
 
     def _touch(self) -> None:
-        """Compiles what the first periods may not need: poses as rotation and position, and a stop."""
+        """Compiles what the first periods may not call: poses as rotation and position, and a stop."""
         self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
         self._braked()

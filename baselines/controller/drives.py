@@ -26,7 +26,7 @@ EVIDENCE = 10.0
 PREDICTED = "predicted"
 #: The longest delay that is identified, in periods.
 LONGEST = 12
-#: What it is told for a real arm: lags of up to 40 ms, 5 % of the velocity limits for corrections, calm commands.
+#: Its settings for a real arm: lags of up to 40 ms, 5 % of the velocity limits for corrections, calm commands.
 SETTINGS: dict[str, Any] = {"longest_delay": LONGEST, "lowest_bandwidth": 4.0, "reserve": 0.05, "overdrive": 1.25}
 
 

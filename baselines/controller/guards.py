@@ -1,4 +1,4 @@
-"""Guards of a control loop: what is not to be believed, or not to go on, and ends in a stop."""
+"""Guards of a control loop: implausible measurements and errors of the path stop the arm."""
 
 from __future__ import annotations
 

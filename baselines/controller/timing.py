@@ -1,4 +1,4 @@
-"""How long the calls of a control loop take."""
+"""Durations of the calls of a control loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Timing(NamedTuple):
 
     Attributes:
         p50: The median.
-        p99: What 99 % of the calls stay below.
+        p99: The 99th percentile.
     """
 
     p50: float

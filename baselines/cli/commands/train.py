@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import importlib.util
 import inspect
@@ -24,7 +23,6 @@ from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, train_seeds
 from baselines.workers import Workers
 from ikgym import rl, scenarios
-from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
@@ -148,23 +146,15 @@ def _require_extra() -> None:
 
 
 def parse(arguments: Sequence[str]) -> Command | ByRewards[Any]:
-    """The command in a command line."""
-    if not arguments:
-        with contextlib.suppress(SystemExit):
-            parse(["--help"])
-    chosen = arguments[0] if arguments else "none"
-    if not arguments or (chosen.startswith("-") and chosen not in ("-h", "--help")):
-        raise InvalidInputError(f"expected a method, one of {', '.join(methods.METHODS)}; got {chosen}.")
-    if not chosen.startswith("-"):
-        known_name("method", chosen, methods.METHODS)
-    by_rewards = chosen in methods.METHODS and chosen != APG.method
-    if by_rewards and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in arguments}:
-        raise InvalidInputError(f"{chosen} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
-    preset = _value_of("--preset", arguments) if chosen == APG.method else None
+    """The command in a command line; without any words they are ``--help``."""
+    given = list(arguments) or ["--help"]
+    if given[0] not in ("-h", "--help"):
+        known_name("method", given[0], methods.METHODS)
+    preset = _value_of("--preset", given) if given[0] == APG.method else None
     kinds = [_subcommand(kind, preset) for kind in methods.METHODS.values()]
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
     command: Command | ByRewards[Any] = parse_options(
-        any_of_them, arguments, prog=_program(), description=manual(), rules=RULES
+        any_of_them, given, prog=_program(), description=manual(), rules=RULES
     )
     return command
 

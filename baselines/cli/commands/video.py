@@ -15,7 +15,7 @@ import tyro
 from tqdm import tqdm
 
 from baselines.cli import shell
-from baselines.cli.parsing import if_random
+from baselines.cli.parsing import EpisodeOptions, if_random
 from baselines.files import ResultsError, check_writable, write
 from baselines.viewer.replay import Replay, Stage, play_all
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
@@ -23,20 +23,12 @@ from ikgym.rendering import Renderer
 from ikgym.validation import number, whole_number
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options(EpisodeOptions):
     """Options of the command."""
 
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE.mp4")]
     """The file to write."""
-    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
-    """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
-    """Policies that are shown side by side, as evaluate takes them."""
-    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Reset seed of the episode."""
-    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Number of steps; all of the scenario if left out."""
     fps: Annotated[float, tyro.conf.arg(metavar="N")] = 30.0
     """Pictures in one second of the video."""
     speed: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0

@@ -10,25 +10,17 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import if_random
+from baselines.cli.parsing import EpisodeOptions, if_random
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 
 
-@dataclasses.dataclass(frozen=True)
-class Options:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options(EpisodeOptions):
     """Options of the command."""
 
-    scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
-    """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
-    """Policies side by side, as evaluate takes them."""
-    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Reset seed of the episode."""
-    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Number of steps; all of the scenario if left out."""
     urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """A URDF file of the arm with meshes. If left out, the file that the arm was read from, else cylinders."""
     host: Annotated[str, tyro.conf.arg(metavar="HOST")] = "127.0.0.1"
