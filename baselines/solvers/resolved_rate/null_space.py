@@ -84,7 +84,6 @@ def null_space_step_among(model, numbers, seen, memory, answer):
     q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
     aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
     objective_rows(plain, q, aim)
-    aim *= plain.secondary_gain
     work = near_work(q.shape[1], shapes.links.shape[0])
     for row in range(q.shape[0]):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
@@ -99,31 +98,24 @@ def null_space_step(model, numbers, seen, memory, answer):
     """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
-    move_rows(numbers, seen.q, jacobian, shift, answer.qdot, answer.status)
+    aim = np.empty(seen.q.shape)
+    objective_rows(numbers, seen.q, aim)
+    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 
 
 @kernel
-def move_rows(numbers, q, jacobian, shift, out, status):
+def aimed_rows(numbers, aim, jacobian, shift, out, status):
     """J⁺ Δx + (I - J⁺ J) Δt z row by row.
 
     Args:
         numbers: The :class:`NullSpaceNumbers`.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        aim: Secondary joint shifts Δt z. Shape (B, n).
         jacobian: Task Jacobians. Shape (B, e, n).
         shift: Task shifts. Shape (B, e).
         out: Receives the joint shifts. Shape (B, n).
         status: Receives values of :class:`Status`. Shape (B,).
     """
-    aim = np.empty(q.shape)
-    objective_rows(numbers, q, aim)
-    aim *= numbers.secondary_gain
-    aimed_rows(numbers, aim, jacobian, shift, out, status)
-
-
-@kernel
-def aimed_rows(numbers, aim, jacobian, shift, out, status):
-    """The same, for secondary joint shifts Δt z of shape (B, n)."""
     tolerance, full_rank = numbers.tolerance, numbers.full_rank
     disturbance, deficient = np.empty(shift.shape), np.empty(aim.shape[0], np.bool_)
     task_rows(jacobian, aim, disturbance)
@@ -141,17 +133,11 @@ def aimed_rows(numbers, aim, jacobian, shift, out, status):
 
 @inner
 def objective_rows(numbers, q, out):
-    """The secondary objective's z / K row by row.
-
-    Args:
-        numbers: The :class:`NullSpaceNumbers`.
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        out: Receives z / K. Shape (B, n).
-    """
+    """Joint shifts Δt z of the secondary objective, row by row: numbers, (B, n), (B, n)."""
     joint_gain, goal = numbers.joint_gain, numbers.goal
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
-            out[row, j] = joint_gain[j] * (goal[j] - q[row, j])
+            out[row, j] = joint_gain[j] * (goal[j] - q[row, j]) * numbers.secondary_gain
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

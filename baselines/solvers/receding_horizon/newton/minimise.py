@@ -59,20 +59,6 @@ class Minimum(NamedTuple):
     gradient_norm: float
 
 
-class LineSearch(NamedTuple):
-    """Result of a line search.
-
-    Attributes:
-        accepted: Whether a trial decreased the merit enough.
-        length: Length of the step; of the next trial where none was accepted.
-        reached: The merit at the last trial.
-    """
-
-    accepted: bool
-    length: float
-    reached: float
-
-
 @uncounted
 def minimise(problem, path, multipliers, settings, workspace):
     """Damped Newton steps from a path, until it is a minimum or they run out.
@@ -119,9 +105,9 @@ def minimise(problem, path, multipliers, settings, workspace):
                 break
             value, true, gap = linearise(problem, path, multipliers, True, exact, workspace)
             continue
-        search = line_search(problem, path, multipliers, value, derivative, step, trial, workspace)
+        accepted, length, reached = line_search(problem, path, multipliers, value, derivative, step, trial, workspace)
         made += 1
-        if not search.accepted:
+        if not accepted:
             if made >= settings.steps:
                 break
             if promised <= ROUNDING * abs(value):
@@ -133,10 +119,10 @@ def minimise(problem, path, multipliers, settings, workspace):
         for k in range(knots):
             for a in range(path.shape[1]):
                 path[k, a] = trial[k, a]
-        true, updated = search.reached, False
+        true, updated = reached, False
         if made == settings.steps:
             break
-        damping = next_damping(damping, search.length)
+        damping = next_damping(damping, length)
         value, true, gap = linearise(problem, path, multipliers, False, exact, workspace)
     return Minimum(outcome, made, true, np.sqrt(scalar_product(gradient, gradient)))
 
@@ -168,10 +154,13 @@ def damped_newton_step(problem, exact, damping, unit, workspace, step):
 
 @uncounted
 def line_search(problem, path, multipliers, value, derivative, step, trial, workspace):
-    """Shortens a step until the merit decreases enough (Armijo); gives a :class:`LineSearch`.
+    """Shortens a step until the merit decreases enough (Armijo).
 
     ``value`` and ``derivative`` are the merit at the path and its derivative along the step; ``trial`` receives the
     path at the last trial.
+
+    Returns:
+        Whether a trial decreased the merit enough, the length of the step, and the merit at the last trial.
     """
     length, reached, accepted = 1.0, value, False
     for _ in range(TRIALS):
@@ -183,7 +172,7 @@ def line_search(problem, path, multipliers, value, derivative, step, trial, work
             accepted = True
             break
         length *= SHORTENING
-    return LineSearch(accepted, length, reached)
+    return accepted, length, reached
 
 
 @inlined

@@ -11,7 +11,7 @@ from baselines.solvers.resolved_rate.base import APPLIED, DEFICIENT
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from baselines.solvers.resolved_rate.gram_schmidt import GramSchmidt, orthonormal_rows
 from baselines.solvers.resolved_rate.jacobian_transpose import JacobianTranspose, transpose_rows
-from baselines.solvers.resolved_rate.null_space import move_rows, objective_rows
+from baselines.solvers.resolved_rate.null_space import aimed_rows, objective_rows
 from baselines.status import Status
 from tests.baselines.solvers.adaptive.arms import observed
 from tests.baselines.solvers.quadratic_program.paths import circle
@@ -38,7 +38,9 @@ def invert(policy, jacobian, shift):
 def move(policy, q, jacobian, shift):
     """The same of `null_space`, at joint coordinates (B, n)."""
     out, status = np.empty_like(q), np.empty(len(q), dtype=np.int64)
-    move_rows(policy.numbers(), q, jacobian, shift, out, status)
+    aim = np.empty_like(q)
+    objective_rows(policy.numbers(), q, aim)
+    aimed_rows(policy.numbers(), aim, jacobian, shift, out, status)
     return out, status
 
 
@@ -46,7 +48,7 @@ def objective_gradient(policy, q):
     """Its secondary objective's z / K, of shape (B, n)."""
     out = np.empty_like(q)
     objective_rows(policy.numbers(), q, out)
-    return out
+    return out / policy.numbers().secondary_gain
 
 
 #: One for each task and number of joints.
