@@ -13,8 +13,8 @@ settings.load_profile("ikgym")
 
 
 def pytest_collection_modifyitems(items):
-    """Slow tests begin first: workers share out what is left, and one that began last would be waited for."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Slow tests come last: many start processes, each of which would compile kernels that are not there yet."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
 
 
 @pytest.fixture(scope="session", autouse=True)
