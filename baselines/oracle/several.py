@@ -50,8 +50,7 @@ def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> 
     scenario, draw = wanted.scenario, wanted.draw
     true = stripped(scenario, draw.seed, draw.arm_seed)
     paths = {spec: path_of(_made(true, spec), true, draw.seed) for spec in wanted.policies}
-    given = {"arm_seed": draw.arm_seed, "cached": wanted.cached, "tick": tick, "paths": paths}
-    return solve(scenario, draw.seed, wanted.how, **given)  # type: ignore[arg-type]  # the types of a dict are joined
+    return solve(scenario, draw.seed, wanted.how, arm_seed=draw.arm_seed, cached=wanted.cached, tick=tick, paths=paths)
 
 
 def find_all(

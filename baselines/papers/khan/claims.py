@@ -1,11 +1,10 @@
 """Khan and Tar 2020: the tests of the claims in ``claims.toml``, each function named after its claim.
 
-Those of section 2 are in :mod:`baselines.papers.khan.without_jacobian`.
+Those of section 2 are in :mod:`baselines.papers.khan.without_jacobian`. One file, although long: all others in their
+order.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from baselines.papers.khan.episodes import (
     Errors,
     Variant,
     at_points,
+    both,
     errors,
     errors_of_variants,
     manufactured_arms,
@@ -35,7 +35,6 @@ from baselines.papers.khan.episodes import (
 from baselines.papers.paper import Figures, Finding, scaled
 from baselines.papers.runs import Runs
 from ikgym import Plant
-from ikgym.validation import FloatArray
 
 
 def _weighted(runs: Runs, name: str, weights: Variant) -> tuple[Errors, Errors]:
@@ -57,19 +56,12 @@ def level_path(runs: Runs) -> Finding:
     return Finding(height < 1e-12 and lean < 1e-12, {"X₃ [m]": height, "lean [rad]": lean})
 
 
-def _steps_until(errors: FloatArray, level: float) -> float:
-    """Inner steps until an error is below a level for the first time, NaN if it never is."""
-    below = np.flatnonzero(errors < level)
-    return float(below[0] + 1) if len(below) else float("nan")
-
-
 def initial_position_error_relaxes(runs: Runs) -> Finding:
     """Inner steps to a tenth of the initial position error."""
     scenario, episode = runs.scenario(Q1), runs.play(Q1, METHOD)
     first = scenario.nominal()[0, 9:] - scenario.arm.forward(np.zeros(scenario.joints))[1]
-    initial = float(np.linalg.norm(first))
-    tenth = _steps_until(episode.position_error, 0.1 * initial)
-    reached = 0.0 if np.isnan(tenth) else float(scenario.points()[int(tenth)] * scenario.dt)
+    tenth = np.flatnonzero(episode.position_error < 0.1 * np.linalg.norm(first))
+    reached = float(scenario.points()[tenth[0] + 1] * scenario.dt) if len(tenth) else 0.0
     return Finding(0.0 < reached < 0.1, {"[s]": reached})
 
 
@@ -233,8 +225,7 @@ def no_inversion(runs: Runs) -> Finding:
 
 def _compensates(runs: Runs, error: str, unit: str) -> Finding:
     """Errors beside those of the exact arm that is driven by the model's joint coordinates."""
-    holds: dict[str, bool] = {}
-    figures: dict[str, list[float]] = {}
+    holds, figures = dict[str, bool](), dict[str, list[float]]()
     for name, path in PATHS.items():
         scenario = runs.scenario(path)
         longer = scenario.replace(iterations_per_point=(60,) * 10 + (50,), steps=600 + 5 * max(scenario.steps - 600, 0))
@@ -262,27 +253,26 @@ def compensates_orientation(runs: Runs) -> Finding:
 
 def precise_model(runs: Runs) -> Finding:
     """Errors with an exact model beside those with the approximate one."""
-    figures: dict[str, Any] = {}
+    figures: dict[str, list[float]] = {}
     holds = True
     for name, path in PATHS.items():
         scenario = runs.scenario(path)
         exact = scenario.replace(arm=scenario.model, model=scenario.model)
         precise, other = errors(runs, exact), errors(runs, path)
         holds &= sound(runs, exact, {}) and not precise.worse(other)
-        figures[f"{name} [mm]"] = 1e3 * precise.position, 1e3 * other.position
-        figures[f"{name} [rad]"] = precise.angle, other.angle
+        figures |= both(name, precise, other)
     return Finding(holds, figures)
 
 
-def _probing(qdot: FloatArray) -> float:
-    """The share of the steps in which one joint moves alone: each other one at less than 1 % of its speed."""
-    *_, second, fastest = np.sort(np.abs(qdot), axis=1).T
-    return float((second < SAME * fastest).mean())
-
-
 def no_exploration(runs: Runs) -> Finding:
-    """Steps in which one joint moves alone, as the investigation of each direction would take."""
-    shares = {name: _probing(runs.play(Q7Q8, name).qdot) for name in (METHOD, *CLOSED_LOOPS)}
+    """Shares of the steps in which one joint moves alone, each other one at less than 1 % of its speed.
+
+    The investigation of each direction would take such steps.
+    """
+    shares = {}
+    for name in (METHOD, *CLOSED_LOOPS):
+        *_, second, fastest = np.sort(np.abs(runs.play(Q7Q8, name).qdot), axis=1).T
+        shares[name] = float((second < SAME * fastest).mean())
     holds = {
         "the method": shares[METHOD] == 0.0,
         "beside inversion": all(shares[name] > shares[METHOD] for name in CLOSED_LOOPS),
@@ -312,12 +302,10 @@ def compensates_manufacturing(runs: Runs) -> Finding:
 
 def needs_precise_measurement(runs: Runs) -> Finding:
     """Whether an error grows with noise in the measured pose."""
-    path, figures = three_seconds(runs), {}
-    holds: dict[str, bool] = {}
+    path, holds, figures = three_seconds(runs), dict[str, bool](), dict[str, list[float]]()
     plants = (Plant(), *(Plant(pose_noise=size, pose_rotation_noise=size) for size in DEVIATIONS))
     for how, variant in LAMBDAS.items():
         exact, *noisy = settled = [errors(runs, path.replace(plant=plant), **variant) for plant in plants]
         holds |= {f"{1e3 * size:g} mm, {how}": e.worse(exact) for size, e in zip(DEVIATIONS, noisy, strict=True)}
-        figures[f"{how} [mm]"] = [1e3 * e.position for e in settled]
-        figures[f"{how} [rad]"] = [e.angle for e in settled]
+        figures |= both(how, *settled)
     return Finding(holds, figures)

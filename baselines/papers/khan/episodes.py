@@ -119,13 +119,16 @@ def no_worse(runs: Runs, one: Variant, other: Variant) -> bool:
     )
 
 
+def both(name: str, *settled: Errors) -> dict[str, list[float]]:
+    """The root mean squares of several errors as figures of one name, in their order."""
+    return {f"{name} [mm]": [1e3 * e.position for e in settled], f"{name} [rad]": [e.angle for e in settled]}
+
+
 def errors_of_variants(runs: Runs, *variants: Variant) -> Figures:
     """The errors of several variants on both paths, in their order."""
     figures: dict[str, list[float]] = {}
     for name, path in PATHS.items():
-        of_path = [errors(runs, path, **variant) for variant in variants]
-        figures[f"{name} [mm]"] = [1e3 * e.position for e in of_path]
-        figures[f"{name} [rad]"] = [e.angle for e in of_path]
+        figures |= both(name, *(errors(runs, path, **variant) for variant in variants))
     return figures
 
 
