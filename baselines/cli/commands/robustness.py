@@ -100,8 +100,7 @@ def with_cost_ratios(rows: Rows, places: Mapping[str, Scenario]) -> list[Row]:
     ]
 
 
-def _work(options: Options, command: str) -> None:
-    del command
+def _work(options: Options, _: str) -> None:
     severities = sorted({number("severities", one, at_least=0.0) for one in options.severities})
     by_place = {place: at(options.scenario, *place) for place in itertools.product(severities, severities)}
     rows = evaluate(
