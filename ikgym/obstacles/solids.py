@@ -15,7 +15,8 @@ from ikgym.arms import Arm
 from ikgym.arms.bodies import Bodies
 from ikgym.kernels.bodies import closest_rows
 from ikgym.obstacles.obstacle import Obstacle, towards
-from ikgym.validation import BoolArray, FloatArray
+from ikgym.trajectories.trajectory import frames_along
+from ikgym.validation import IDENTITY, BoolArray, FloatArray
 
 #: Stretches into which a quarter of a circle is divided.
 STRETCHES = 5
@@ -72,16 +73,11 @@ def link_frames(arm: Arm, q: FloatArray) -> FloatArray:
 
     Shapes (N, n) of joint coordinates, and (N, n + 1, 12).
     """
-    rotation, position = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
-    frames = [(rotation, position)]
-    for coordinate, offset, axis, prismatic in zip(q.T[..., None], arm.offsets, arm.axes, arm.prismatic, strict=True):
-        position = position + np.einsum("kij,kj->ki", rotation, offset + coordinate * axis * prismatic)
-        if not prismatic:
-            cross = np.cross(axis, np.eye(3)).T
-            sine, versine = np.sin(coordinate)[..., None], 1.0 - np.cos(coordinate)[..., None]
-            rotation = rotation @ (np.eye(3) + sine * cross + versine * (cross @ cross))
-        frames.append((rotation, position))
-    return np.stack([np.hstack([turned.reshape(-1, 9), at]) for turned, at in frames], axis=1)
+    frames = [np.tile([*IDENTITY.ravel(), 0.0, 0.0, 0.0], (len(q), 1))]
+    for link in range(1, arm.joints + 1):
+        before = Arm(arm.name, arm.offsets[:link], arm.axes[:link], arm.prismatic[:link])
+        frames.append(frames_along(q[:, :link], before))
+    return np.stack(frames, axis=1)
 
 
 def surface(size: FloatArray, stretches: int = STRETCHES) -> tuple[FloatArray, npt.NDArray[np.int64]]:

@@ -16,13 +16,6 @@ DRAWN = [name for name in problems.NAMES if name not in (*RANDOM, *problems.OBST
 def test_names():
     assert len(problems.names()) == len(set(problems.names())) == 220
     assert len(RANDOM) == 100
-    assert [len(problems.waypoints(name).positions) for name in DRAWN] == [
-        *(553, 209, 227, 478, 587),
-        *(553, 209, 249, 553, 209, 249),
-        320,
-    ]
-    lengths = [len(problems.waypoints(name).positions) for name in RANDOM]
-    assert (min(lengths), max(lengths), sum(lengths)) == (379, 966, 62_610)
 
 
 @pytest.mark.parametrize("name", [*DRAWN, *RANDOM[::10]])
@@ -34,10 +27,6 @@ def test_shapes_and_units(name):
     expected = 0 if name.startswith("cppflow") else 1 if name in RANDOM else 100
     assert starts.shape == (expected, 7)
     assert not any(array.flags.writeable for array in problems.waypoints(name))
-    # Paths do not jump: 48.1 mm and 16.1° at most.
-    assert np.linalg.norm(np.diff(positions, axis=0), axis=1).max() < 0.049
-    turns = Rotation.from_quat(quaternions, scalar_first=True)
-    assert np.degrees((turns[:-1].inv() * turns[1:]).magnitude()).max() < 16.1
 
 
 def test_the_numbers_have_not_changed():

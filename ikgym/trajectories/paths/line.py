@@ -28,16 +28,7 @@ class Line(Path):
     def __post_init__(self) -> None:
         super().__post_init__()
         points_of("start and end", [self.start, self.end])
-
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return float(np.linalg.norm(self.end - self.start))
-
-    @property
-    def curvature(self) -> float:
-        """See :attr:`Path.curvature`."""
-        return 0.0
+        self._settle(length=float(np.linalg.norm(self.end - self.start)), curvature=0.0)
 
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :meth:`Path.along`."""

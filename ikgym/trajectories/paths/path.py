@@ -18,15 +18,10 @@ class Path(Frozen, abc.ABC):
     Its direction is continuous, so that a tool can run along it without a stop.
     """
 
-    @property
-    @abc.abstractmethod
-    def length(self) -> float:
-        """The length of the path in [m]."""
-
-    @property
-    @abc.abstractmethod
-    def curvature(self) -> float:
-        """The largest curvature in [1/m], 0 for a straight line."""
+    #: The length of the path in [m].
+    length: float
+    #: The largest curvature in [1/m], 0 for a straight line.
+    curvature: float
 
     @property
     def stations(self) -> FloatArray:
@@ -48,20 +43,17 @@ class Path(Frozen, abc.ABC):
 class Outline(Path):
     """A path that runs along another one."""
 
-    @property
+    #: The other path.
+    outline: Path
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        outline = self._outlined()
+        self._settle(outline=outline, length=outline.length, curvature=outline.curvature)
+
     @abc.abstractmethod
-    def outline(self) -> Path:
-        """The other path."""
-
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return self.outline.length
-
-    @property
-    def curvature(self) -> float:
-        """See :attr:`Path.curvature`."""
-        return self.outline.curvature
+    def _outlined(self) -> Path:
+        """The other path, from checked fields."""
 
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :meth:`Path.along`."""

@@ -55,16 +55,7 @@ class Polyline(Path):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_corners()
-
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return float(self._pieces.begin[-1])
-
-    @property
-    def curvature(self) -> float:
-        """See :attr:`Path.curvature`."""
-        return float(self._pieces.curvature.max())
+        self._settle(length=float(self._pieces.begin[-1]), curvature=float(self._pieces.curvature.max()))
 
     @property
     def stations(self) -> FloatArray:
@@ -158,13 +149,8 @@ class Square(Outline):
     corner_radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _outlined(self) -> Polyline:
         number("corner_radius", self.corner_radius, at_most=0.5 * self.side)
-
-    @functools.cached_property
-    def outline(self) -> Polyline:
-        """See :attr:`Outline.outline`."""
         corners = np.array([[0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0], [0, -1, 0]])
         return Polyline(self.center + 0.5 * self.side * corners @ self.rotation.T, self.corner_radius)
 
@@ -193,14 +179,9 @@ class Raster(Outline):
     corner_radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _outlined(self) -> Polyline:
         between = self.height / (self.lines - 1)
         number("corner_radius", self.corner_radius, at_most=0.5 * min(between, self.width))
-
-    @functools.cached_property
-    def outline(self) -> Polyline:
-        """See :attr:`Outline.outline`."""
         rows = np.repeat(np.linspace(-0.5, 0.5, self.lines) * self.height, 2)
         ends = np.resize([-0.5, 0.5, 0.5, -0.5], 2 * self.lines) * self.width
         corners = np.column_stack([ends, rows, np.zeros(2 * self.lines)])

@@ -34,15 +34,9 @@ class CircularHelix(Path):
     turns: Positive = 1.0
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return 2.0 * math.pi * self.turns * self._rate
-
-    @property
-    def curvature(self) -> float:
-        """See :attr:`Path.curvature`."""
-        return self.radius / self._rate**2
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(length=2.0 * math.pi * self.turns * self._rate, curvature=self.radius / self._rate**2)
 
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :meth:`Path.along`."""
@@ -93,15 +87,9 @@ class Lemniscate(Path):
     radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return float(self._arc.lengths[-1])
-
-    @property
-    def curvature(self) -> float:
-        """At both ends. See :attr:`Path.curvature`."""
-        return 3.0 / self.radius
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(length=float(self._arc.lengths[-1]), curvature=3.0 / self.radius)  # that at both ends
 
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :meth:`Path.along`."""

@@ -32,7 +32,6 @@ class SplinePath(Path):
     """
 
     points: Points
-    _curvature: float = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -42,17 +41,8 @@ class SplinePath(Path):
                 f"points: expected a curve that nowhere turns straight back, got one that does near number {i}, "
                 f"{self.points[i].tolist()}."
             )
-        self._settle(_curvature=curvature)
-
-    @property
-    def length(self) -> float:
-        """See :attr:`Path.length`."""
-        return float(self._arc.lengths[-1])
-
-    @property
-    def curvature(self) -> float:
-        """The largest of 128 samples between two points. See :attr:`Path.curvature`."""
-        return self._curvature
+        # The largest curvature of 128 samples between two points.
+        self._settle(length=float(self._arc.lengths[-1]), curvature=curvature)
 
     @property
     def stations(self) -> FloatArray:
