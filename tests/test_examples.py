@@ -1,5 +1,6 @@
 """Every example runs."""
 
+import importlib.util
 import re
 import runpy
 from pathlib import Path
@@ -9,14 +10,24 @@ import pytest
 
 ROOT = Path(__file__).parents[1] / "examples"
 #: Arguments that make each example short.
-SMALL = {"ppo": (1,), "wrappers": (), "behaviour_cloning": (2, 3, 1), "sac": (64, 3)}
+SMALL = {"ppo": (1,), "wrappers": (), "behaviour_cloning": (2, 3, 1), "sac": (64, 3), "torchrl_ppo": (1,)}
+# TorchRL is in no extra, and warns of what is old in itself.
+TORCHRL = [
+    pytest.mark.skipif(importlib.util.find_spec("torchrl") is None, reason="no TorchRL: pip install torchrl"),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning"),
+]
+
+
+def marked(example):
+    """An example, skipped where its library is missing."""
+    return pytest.param(example, marks=TORCHRL if example == "torchrl_ppo" else ())
 
 
 def run(example, *arguments):
     return runpy.run_path(str(ROOT / f"{example}.py"))["main"](*arguments)
 
 
-@pytest.mark.parametrize("example", [path.stem for path in sorted(ROOT.glob("*.py"))])
+@pytest.mark.parametrize("example", [marked(path.stem) for path in sorted(ROOT.glob("*.py"))])
 def test_example(example, capsys, tmp_path):
     run(example, *((tmp_path / "sac",) if example == "sac" else ()), *SMALL[example])
     printed = capsys.readouterr().out
@@ -29,9 +40,10 @@ def test_example(example, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_ppo_learns():
+@pytest.mark.parametrize("example", [marked("ppo"), marked("torchrl_ppo")])
+def test_agents_of_examples_learn(example):
     """Without training the score is 0 to 0.02, after 60 of 240 updates 0.1 to 0.2."""
-    assert run("ppo", 60) > 0.08
+    assert run(example, 60) > 0.08
 
 
 def test_the_wrappers_of_the_example_do_what_they_say():
