@@ -18,7 +18,7 @@ from ikgym import rl, scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.kernels.tasks import SKEW
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, flag, known_names, number, whole_number
+from ikgym.validation import Frozen, known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
 
@@ -65,11 +65,10 @@ class APG(Frozen):
     segments: Annotated[int, tyro.conf.arg(metavar="N")] = 20
     """Number of parts of the training. A validation and a checkpoint may follow each of them."""
     evaluate_every: Annotated[int, tyro.conf.arg(metavar="N")] = 2
-    """Segments between validations; the untrained and the final agent are always validated."""
+    """Segments between validations; the untrained and the final agent are always validated. The agent with the least
+    geometric mean of the costs is kept."""
     validation_episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 32
     """Episodes of each validation: the first seeds of the split "validation". A deterministic scenario has one."""
-    keep_best: bool = True
-    """Keep the agent with the best validation score (geometric mean of the costs) instead of the last one."""
     learning_rate: Annotated[float, tyro.conf.arg(metavar="RATE")] = 2e-3
     """Learning rate of Adam in the first segment."""
     learning_rate_end: Annotated[float, tyro.conf.arg(metavar="RATE")] = 5e-5
@@ -107,7 +106,6 @@ class APG(Frozen):
         self._settle_by(whole_number, "n_envs", at_least=1, at_most=MOST_ARMS)
         if self.steps is not None:
             self._settle_by(whole_number, "steps", at_least=1)
-        flag("keep_best", self.keep_best)
         known_names("activation", [self.activation], get_args(Activation))
         self._settle_by(_whole_numbers, "hidden", most=MOST_LAYERS, at_most=MOST_NEURONS)
         self._settle_by(number, "learning_rate", "learning_rate_end", "max_grad_norm", above=0.0, at_most=MOST_RATE)

@@ -169,15 +169,13 @@ class _Run:
 
     def _finish(self) -> dict[str, Any]:
         """Writes the agent and the result of the run."""
-        policy, config, best = self._trainer.policy, self._config, self._at.best
-        final = weights_hash(policy)
-        kept, score = {"segment": config.segments, "by": "end"}, self._at.history[-1]["validation"]
-        if config.keep_best and best is not None:
-            policy.load_state_dict(best["policy"])
-            kept, score = {"segment": best["segment"], "by": "validation"}, best["score"]
+        policy, best = self._trainer.policy, self._at.best
+        assert best is not None  # the untrained agent is validated at the latest
         self._about["status"] = "finished"
-        self._about["weights_sha256"] = final
-        self._about["kept"] = {**kept, "weights_sha256": weights_hash(policy), "validation": score}
+        self._about["weights_sha256"] = weights_hash(policy)
+        policy.load_state_dict(best["policy"])
+        kept = {"segment": best["segment"], "by": "validation", "weights_sha256": weights_hash(policy)}
+        self._about["kept"] = {**kept, "validation": best["score"]}
         content = self._content()
         training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
         save_agent(self._folder.agent, self._trainer.agent(training))

@@ -22,16 +22,6 @@ EVERY = 16
 LEAST = 1e-3
 
 
-def spread_steps(scenario: Scenario, rows: int) -> Indices:
-    """Steps at which N arms enter their episodes, so that an update sees all parts of one. Shape (N,).
-
-    Without a reference joint path, all episodes begin at step 0.
-    """
-    if scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is None:
-        return np.zeros(rows, dtype=np.int64)
-    return np.arange(rows) * scenario.steps // rows
-
-
 class Arms:
     """N arms, each in an episode of its own, with their reference trajectories.
 
@@ -109,9 +99,13 @@ class Arms:
         self._put(rows, np.zeros(len(rows), dtype=np.int64) if at is None else at)
 
     def spread(self, generator: np.random.Generator) -> None:
-        """Begins a new episode for each arm, see :func:`spread_steps`."""
-        rows = np.arange(len(self.seed))
-        self.begin(rows, generator, spread_steps(self._scenario, len(rows)))
+        """Begins a new episode for each arm, after other steps, so that an update sees all parts of one.
+
+        Without a reference joint path, all episodes begin at step 0.
+        """
+        rows, scenario = np.arange(len(self.seed)), self._scenario
+        follows = scenario.nominal_joint_path(scenarios.SPLITS["train"].start) is not None
+        self.begin(rows, generator, rows * scenario.steps // len(rows) if follows else None)
 
     def give_up(self, rows: Indices) -> None:
         """Puts lost arms back on their reference joint paths, or to the start if there is none."""

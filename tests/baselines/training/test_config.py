@@ -18,7 +18,6 @@ REFUSED = [
     ({"hidden": []}, "hidden: expected 1 to 10 whole numbers"),
     ({"hidden": [8, 0]}, "hidden: expected a whole number from 1 to 2048, got 0"),
     ({"offsets": [2, 5]}, "offsets: expected steps ahead that rise from 1"),
-    ({"keep_best": "yes"}, "keep_best: expected true or false"),
     ({"learning_rate": -1}, "learning_rate: expected a finite number above 0"),
     ({"window": 64}, "window: expected 1 to 100 whole numbers, got 64"),
     ({"window": [88]}, "window: expected .* that divide segment_steps, 1920, got 88"),

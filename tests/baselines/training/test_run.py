@@ -166,10 +166,8 @@ def test_a_run_killed_between_its_last_checkpoint_and_the_history_is_complete(fi
 
 def test_seeds_differ_and_validation_changes_nothing(finished, tmp_path):
     assert train(CONFIG, 4, tmp_path / "4")["weights_sha256"] != finished[1]["weights_sha256"]
-    seldom = CONFIG.replace(evaluate_every=3, validation_episodes=1, keep_best=False)
+    seldom = CONFIG.replace(evaluate_every=3, validation_episodes=1)
     assert train(seldom, 3, tmp_path / "3")["weights_sha256"] == finished[1]["weights_sha256"]
-    kept = about(tmp_path / "3")["kept"]
-    assert (kept["by"], kept["weights_sha256"]) == ("end", finished[1]["weights_sha256"])
 
 
 def test_folders_are_not_overwritten(finished, tmp_path):
@@ -221,6 +219,7 @@ class Evil:
         ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
         ("checkpoint.pt", saved({"format": 99}), "it has another format"),
         ("checkpoint.pt", saved({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
+        ("checkpoint.pt", saved({"format": FORMAT})[:-1] + b"?", "expected the SHA-256"),  # one byte is another
         ("run.json", b"{", "run.json is damaged"),
         ("run.json", b'{"format": 2}', f"differs in format \\(2 there, {FORMAT} here\\)"),
     ],
@@ -229,15 +228,6 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ResultsError, match=message):
-        train(CONFIG, 3, tmp_path, resume=True)
-
-
-def test_a_bit_of_a_checkpoint_is_wrong(finished, tmp_path):
-    copied(finished[0], tmp_path)
-    damaged = bytearray((tmp_path / "checkpoint.pt").read_bytes())
-    damaged[-1] ^= 64
-    (tmp_path / "checkpoint.pt").write_bytes(damaged)
-    with pytest.raises(ResultsError, match="expected the SHA-256"):
         train(CONFIG, 3, tmp_path, resume=True)
 
 
