@@ -200,7 +200,7 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
-    path = path_scores(scenario, seeds, episode)
+    along_path: dict[str, Any] = path_scores(scenario, seeds, episode)
     episode = first_steps(episode, scenario.steps)
     total = float(add_up(episode.cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
@@ -251,9 +251,7 @@ def measure(
         noise_seed=seeds.noise_seed,
         ideal=ideal,
         acceleration_stated=bool(np.isfinite(scenario.arm.acceleration_limit).all()) or not scenario.arm.limited,
-        path_time=path and path.time,
-        path_position_error=path and path.position_error,
-        path_orientation_error=path and path.orientation_error,
+        **along_path,
         **contacts(scenario, episode),
     )
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,14 +20,6 @@ from ikgym.validation import FloatArray
 
 #: How many times as long as the scenario an episode may become; the numbers before are tried first.
 LONGER = (1, 2, 4)
-
-
-class PathScores(NamedTuple):
-    """How a path was followed."""
-
-    time: float | None  # when its end was reached, in [s]; None if it was not
-    position_error: float  # largest distance from the reference at the policy's own progress, in [m]
-    orientation_error: float | None  # likewise, in [rad]; None for tasks whose coordinates are no angles
 
 
 def play_to_end(
@@ -66,19 +57,22 @@ def as_long(scenario: Scenario, episode: Episode) -> Scenario:
     return scenario if steps == scenario.steps else scenario.replace(steps=steps)
 
 
-def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> PathScores | None:
-    """How the path was followed; None for a policy without free timing."""
+def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> dict[str, float | None]:
+    """The columns of a row that state how the path was followed, see :class:`baselines.evaluation.metrics.Row`.
+
+    None for a policy without free timing.
+    """
     if "progress" not in episode.diagnostics:
-        return None
+        return {}
     task, end = scenario.task, _end(scenario, episode)
     error = task.error(reference_at(scenario, seeds, episode.diagnostics["progress"]), episode.pose)[:end]
     first = 0 if task.kind in (POSE, AXIS) else task.error_size - 3
     position, angles = error[:, first : first + 3], error[:, 3:] if task.kind in (POSE, AXIS) else None
-    return PathScores(
-        None if end is None else end * scenario.dt,
-        float(np.linalg.norm(position, axis=1).max()),
-        None if angles is None else float(np.linalg.norm(angles, axis=1).max()),
-    )
+    return {
+        "path_time": None if end is None else end * scenario.dt,
+        "path_position_error": float(np.linalg.norm(position, axis=1).max()),
+        "path_orientation_error": None if angles is None else float(np.linalg.norm(angles, axis=1).max()),
+    }
 
 
 def reference_at(scenario: Scenario, seeds: Seeds, progress: FloatArray) -> FloatArray:
