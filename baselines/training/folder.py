@@ -18,7 +18,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.files import read_bytes, reading, resumed, write
+from baselines.files import ResultsError, read_bytes, read_json, reading, resumed, write
 
 #: The version of `run.json` and of `checkpoint.pt`.
 FORMAT = 3
@@ -56,6 +56,19 @@ class Folder:
         events = self.tensorboard.glob("events.out.tfevents.*")
         for file in (self.run, self.checkpoint, self.history, self.agent, *events):
             file.unlink(missing_ok=True)
+
+
+def read_run(file: pathlib.Path) -> dict[str, Any]:
+    """The content of a `run.json`.
+
+    Raises:
+        ResultsError: It cannot be read, or has another format.
+    """
+    content = read_json(file)
+    keys = {"format", "method", "seed", "config"}
+    if not isinstance(content, dict) or not keys <= content.keys() or content["format"] != FORMAT:
+        raise ResultsError(f"{file}: expected the run.json of a training in format {FORMAT}.")
+    return content
 
 
 @dataclasses.dataclass
