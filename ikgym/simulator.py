@@ -23,7 +23,7 @@ from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, entered_states
-from ikgym.scenarios.frames.motion import MotionFrames, frames_of_rows
+from ikgym.scenarios.frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
 from ikgym.validation import FloatArray, whole_number

@@ -1,4 +1,4 @@
-"""The nominal frames of N episodes along joint motions, each computed when a step first needs it."""
+"""The nominal frames of N episodes: whole tables, or for joint motions those that are near."""
 
 from __future__ import annotations
 
@@ -9,12 +9,66 @@ import numpy.typing as npt
 
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.motions import Motions
-from ikgym.scenarios.frames.nominal import NominalFrames
+from ikgym.parallel import in_chunks
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import JointMotions, Trajectory
 from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
+
+# Rows worth a thread of their own: below, handing over costs more than it saves.
+GRAIN = 4
+# Rows whose frames are computed at a time: their intermediate results stay small.
+PIECE = 64
+
+
+class NominalFrames:
+    """All frames of N episodes; where the scenario is fixed they share one table.
+
+    Args:
+        scenario: The scenario.
+        rows: N.
+        ahead: Steps ahead that are shown, rising.
+
+    Attributes:
+        point: Which point is the target after k steps, and its place in a table. Shape (steps + furthest preview + 1,).
+        shape: Of the tables.
+    """
+
+    def __init__(self, scenario: Scenario, rows: int, ahead: tuple[int, ...]) -> None:
+        self._scenario = scenario
+        self.point = self.slots = scenario.points(ahead)
+        width = 12 if scenario.task.has_orientation else 3
+        self.shape = (rows if scenario.random else 1, int(self.point[-1]) + 1, width)
+
+    def allocate(self) -> FloatArray:
+        """The tables, of :attr:`shape`, when there is memory for them; that of a fixed scenario is filled."""
+        tables = np.zeros(self.shape)
+        self._episodes: list[Trajectory] = [self._scenario.trajectory] * len(tables)
+        if not self._scenario.random:
+            self.begin(tables, np.zeros(1, dtype=np.int64), self._episodes)
+        return tables
+
+    def begin(self, tables: FloatArray, rows: Integers, episodes: Sequence[Trajectory]) -> None:
+        """Begins new episodes in some rows. Shape (k,)."""
+        for row, episode in zip(rows.tolist(), episodes, strict=True):
+            self._episodes[row] = episode
+        points = np.arange(self.shape[1])
+
+        def work(start: int, stop: int) -> None:
+            for part in range(start, stop, PIECE):
+                some = rows[part : min(part + PIECE, stop)]
+                own = [self._episodes[row] for row in some.tolist()]
+                tables[some] = self._scenario.frames_of(own, np.broadcast_to(points, (len(some), len(points))))
+
+        in_chunks(work, len(rows), GRAIN)
+
+    def positions(self, row: int) -> FloatArray:
+        """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""
+        point = self.point[: self._scenario.steps + 1]
+        episode = self._episodes[row if self._scenario.random else 0]
+        positions: FloatArray = self._scenario.frames(episode, int(point[-1]) + 1)[point, -3:]
+        return positions
 
 
 class MotionFrames:

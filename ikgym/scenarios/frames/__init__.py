@@ -1,1 +1,0 @@
-"""The nominal frames of N episodes."""
