@@ -1,4 +1,4 @@
-"""The nominal frames of N episodes: in whole tables, or each computed when a step first needs it."""
+"""The nominal frames of N episodes: whole tables, or for joint motions those that are near."""
 
 from __future__ import annotations
 
