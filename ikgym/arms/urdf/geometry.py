@@ -17,9 +17,9 @@ from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
 from ikgym.validation import LARGEST, FloatArray
 
-KINDS = (".stl", ".obj", ".ply", ".dae")
+MESHES = (".stl", ".obj", ".ply", ".dae")
 # Collision meshes take some hundred kilobytes.
-MAX_BYTES = 64 * 2**20
+MESH_BYTES = 64 * 2**20
 # A package is a folder at most so far above the URDF file.
 LEVELS = 8
 
@@ -93,9 +93,9 @@ def _corners(where: str, name: str, folder: Path) -> tuple[FloatArray, float]:
     except ImportError as error:
         raise MissingDependencyError('Meshes need trimesh: pip install "ikgym[urdf]"') from error
     path = _found(where, name, folder)
-    if path.suffix.lower() not in KINDS:
-        raise InvalidInputError(f"{where}: expected a mesh of kind {', '.join(KINDS)}, got {name!r}.")
-    content = read_user_file(path, MAX_BYTES)
+    if path.suffix.lower() not in MESHES:
+        raise InvalidInputError(f"{where}: expected a mesh of kind {', '.join(MESHES)}, got {name!r}.")
+    content = read_user_file(path, MESH_BYTES)
     if path.suffix.lower() == ".dae" and (not content.lstrip().startswith(b"<") or b"<!DOCTYPE" in content):
         raise InvalidInputError(f"{where}: expected XML without a DOCTYPE in {name!r}.")
     try:
