@@ -186,7 +186,7 @@ def test_no_rows_are_a_batch(name):
 def test_any_policy_inside_smoothed(name):
     """At its first step, the inner policy sees what it would see alone; its state is found in the wrapper's."""
     short = scenario(usual(name))
-    alone, policy = made(name, short), baselines.make("smoothed", short, policy=name, feedback="measured")
+    alone, policy = made(name, short), baselines.make("smoothed", short, policy=name)
     assert policy.preview == alone.preview
     assert policy.options == alone.parameters
     own, inside = policy.split(policy.memory(3))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
-from baselines.policy.parameters import choice, parameter
+from baselines.policy.parameters import parameter
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
@@ -41,13 +41,10 @@ class Smoothed(NamedWrapper):
     At the start, where the paper says nothing, qˢ = q and q̇ˢ = 0. qˢ is the measured q: roundings do not pile up.
     A constant velocity is followed 2/Λ late.
 
-    The paper smooths the calculated q(t) afterwards, so that the calculation does not know of the smoothing. That is
-    ``feedback="calculated"``: the inner policy sees the arm where its own velocities would have brought the model,
-    and runs as if it were alone. What a wrong model, disturbed drives or a saturated velocity do to the pose is then
-    seen by nobody, and stays. With ``"measured"`` the inner policy sees the arm as it is, and its velocities go on
-    to make up q(t). The lag is then part of its loop: a resolved rate of gain g is stable where all z with
-    (z − 1)(z − 1 + ΛΔt)² = −(ΛΔt)² g lie inside the unit circle, that is for g < 0.35 at ΛΔt = 0.3 and not with the
-    usual 1. Receding horizons, which ask for what is missing in very few steps, diverge.
+    The paper smooths the calculated q(t) afterwards, so that the calculation does not know of the smoothing: the inner
+    policy sees the arm where its own velocities would have brought the model, and runs as if it were alone. What a
+    wrong model, disturbed drives or a saturated velocity do to the pose is then seen by nobody, and stays. (Shown the
+    arm as it is, the inner policy has the lag in its loop: a resolved rate of gain 1 and receding horizons diverge.)
 
     The filter is stable for ΛΔt < 2, and does not overshoot for ΛΔt ≤ 1. Status and iterations are those of the
     inner policy. References, which know more than they see, cannot be smoothed.
@@ -57,16 +54,14 @@ class Smoothed(NamedWrapper):
         policy: The name of the inner policy.
         options: Its parameters; those left out have its defaults.
         relaxation: Λ in [1/s], above 0 and below 2/Δt.
-        feedback: ``"calculated"`` as in the paper, or ``"measured"``.
 
     Raises:
-        UnknownNameError: There is no such policy, parameter of it, or feedback.
+        UnknownNameError: There is no such policy, or parameter of it.
         InvalidInputError: Λ is out of its range, the policy is a reference, or it refuses its parameters.
     """
 
     policy: str = "rhc_gradient"
     relaxation: float = parameter(300.0, number, above=0.0)
-    feedback: str = parameter("calculated", choice, available=("calculated", "measured"))
 
     name: ClassVar[str] = "smoothed"
 
@@ -91,11 +86,8 @@ class Smoothed(NamedWrapper):
         dt, lambda_, limit = self.problem.dt, self.relaxation, self.problem.velocity_limit
         known = own.known[:, None]
         calculated = np.where(known, own.q, batch.q)
-        seen = batch
-        if self.feedback == "calculated":
-            qdot = np.where(known, own.qdot, batch.qdot)
-            seen = batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated))
-        step = self.ask(seen, inside)
+        qdot = np.where(known, own.qdot, batch.qdot)
+        step = self.ask(batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated)), inside)
         # The arm does not exceed the limit.
         sent = np.clip(own.smooth, -limit, limit)
         acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16

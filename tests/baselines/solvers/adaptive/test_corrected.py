@@ -7,6 +7,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.policy import Problem
 from baselines.solvers.adaptive.calibrated import PAUSE
 from baselines.solvers.adaptive.chain_parameters import parameter_twists
 from ikgym import Plant
@@ -22,6 +23,7 @@ from tests.baselines.solvers.adaptive.arms import (
     scenario,
     true_deviation,
 )
+from tests.baselines.test_wrapper import Halved
 from tests.comparison import identical
 
 NAMES = ["offset_free", "calibrated", "filter_bank"]
@@ -125,10 +127,16 @@ def test_what_is_kept_survives_the_start_of_an_episode_and_no_more(name):
         assert identical(tuple(cleared), tuple(policy.memory(1)))
 
 
+class Outer(Halved):
+    """A wrapper around wrappers."""
+
+    nests = True
+
+
 def test_what_is_kept_is_kept_inside_other_policies():
     arm, q = perturbed(6), path(7, 30)
     inner = {"policy": "dls", "keep": True, **NOISE}
-    policy = baselines.make("smoothed", scenario(), policy="calibrated", options=inner, feedback="measured")
+    policy = Outer(Problem.of(scenario()), policy="calibrated", options=inner)
     state = learnt(policy, *arm, q)
     begun = learnt(policy, *arm, q[:1], state=state, start=np.array([True]))
     before, after = (memory(policy.inner, policy.inner_state(s)).parameters for s in (state, begun))

@@ -43,19 +43,6 @@ def test_is_the_papers_filter_on_the_path_of_the_policy_alone(policy, lambda_):
     np.testing.assert_allclose(episode.qdot, wanted, atol=2e-5 * max(1.0, lambda_ / 300))
 
 
-@pytest.mark.parametrize(("gain", "stable"), [(0.3, True), (0.4, False)])
-def test_the_bound_for_measured_feedback(gain, stable):
-    """(z - 1)(z - 1 + a)² = -a² g with a = 0.3: stable below 0.35."""
-    roots = 1.0 + np.roots([1.0, 0.6, 0.09, 0.09 * gain])
-    assert (np.abs(roots).max() < 1.0) == stable
-    here = np.array([0.1, 0.4, 1.0])
-    still = ikgym.trajectories.Sinusoid(np.zeros(3), offset=here)
-    scenario = short("faitli3-regular", steps=1000, trajectory=still, start=here + 1e-6)
-    policy = smoothed(scenario, policy="moore_penrose", options={"gain": gain}, feedback="measured")
-    errors = rollout(scenario, policy, 0).position_error
-    assert (errors[-100:].max() < errors[:100].max()) == stable
-
-
 def test_a_saturated_velocity_is_remembered_as_it_was_sent():
     """Otherwise the filter would take the arm for faster than it is; and it starts from the q that is measured."""
     scenario = short(velocity_limit=np.full(7, 2.0), plant=ikgym.Plant(bias=0.1))
