@@ -5,6 +5,7 @@ import csv
 import pytest
 
 from baselines.cli.commands import leaderboard, robustness
+from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 
 
@@ -40,7 +41,9 @@ def test_leaderboard_takes_test_sets_or_scenarios(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_robustness_draws_a_map(tmp_path, capsys):
-    words = ["--policies", "dls", "--severities", "0", "1", "--episodes", "1", "--out", str(tmp_path)]
+    short, out = tmp_path / "short.toml", str(tmp_path)
+    scenarios.get("panda-field").replace(steps=300).save(short)
+    words = ["--scenario", str(short), "--policies", "dls", "--severities", "0", "1", "--episodes", "1", "--out", out]
     assert robustness.main(words) == 0
     cells = {(line["knowledge"], line["drives"]): line for line in lines_of(tmp_path / "map.csv")}
     assert set(cells) == {(k, d) for k in ("0.0", "1.0") for d in ("0.0", "1.0")}
