@@ -133,8 +133,8 @@ def sequences(
 ) -> list[list[Episode]]:
     """Plays sequences of episodes; the policy keeps its state from one episode to the next.
 
-    `predict` receives `episode_start` where the next episode begins. A policy can so use in later episodes what it
-    learned of its arm; memory that does not survive `episode_start` is cleared.
+    `predict` receives `episode_start` where the next episode begins. So a policy can use in later episodes the
+    arm that it has learned; memory that does not survive `episode_start` is cleared.
 
     Args:
         scenario: The scenario.

@@ -15,7 +15,7 @@ from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
-#: Fields of a scenario that change no result: its words, and what matters only where bodies may not touch.
+#: Fields of a scenario that change no result: texts, and fields that matter only where bodies may not touch.
 APART = {"name", "source", "obstacles", "collisions", "proximity"}
 #: Numbers in arrays, mostly of the order of 1, count up to here.
 DECIMALS = 12

@@ -21,7 +21,7 @@ _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 #: Result of a step's kernel for observations that are not finite; otherwise that of :func:`cut_rows`.
 REFUSED = 2
 
-# The bits of the exponent: all of them are set in infinities and in what is no number, and nowhere else.
+# The bits of the exponent: all of them are set in infinities and in NaN, and nowhere else.
 _EXPONENT = 0x7FF0000000000000
 
 
@@ -158,8 +158,8 @@ def entry(step: Any, numbers: type, memory: type) -> Any:
     Returns:
         ``call(block, numbers, checking, seen, memory, action, answer)`` with plain tuples and flat arrays, whatever the
         number of rows, but for the reference coordinates of shape (B p, m). The memory becomes the next one in place.
-        It returns REFUSED for observations that are not finite, else what :func:`cut_rows` does; with an ``action`` of
-        no elements nothing is cut.
+        It returns REFUSED for observations that are not finite, else the status of :func:`cut_rows`; with an ``action``
+        of no elements nothing is cut.
     """
     python = getattr(step, "py_func", step)
     scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory}
@@ -192,7 +192,7 @@ def cut_rows(qdot, limit, action, status):
         qdot: In [rad/s] or [m/s]. Shape (B, n).
         limit: In [rad/s] or [m/s]. Shape (n,).
         action: Receives the actions; zeros where a number is not finite. Shape (B, n).
-        status: Raised to what the row deserves. Shape (B,).
+        status: Raised to the status of the row. Shape (B,).
 
     Returns:
         Whether a number of any row is not finite.

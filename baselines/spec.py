@@ -46,7 +46,7 @@ def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
 
     Args:
         spec: ``"package.module:Class"``, ``"package.module:Class:parameter=value,…"``, or a pair of the first and
-            parameters. What begins with the name of a registered policy is not meant.
+            parameters. Texts that begin with the name of a registered policy are none.
 
     Raises:
         InvalidInputError: The parameters have another form, or one is given twice.

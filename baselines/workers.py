@@ -106,7 +106,7 @@ def finished(
         tries: Attempts at a unit.
 
     Yields:
-        A unit, and the future of its result. The future raises what the function raised, or :class:`WorkerError` if
+        A unit, and the future of its result. The future raises the function's exception, or :class:`WorkerError` if
         workers died over the unit `tries` times.
 
     Raises:

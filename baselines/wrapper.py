@@ -24,13 +24,13 @@ from ikgym.validation import FloatArray, known_names
 class Wrapper(SolverPolicy, abc.ABC):
     """Base of all policies around another one.
 
-    `solve` of a wrapper splits its memory, asks the inner policy, and returns what becomes of its action:
+    `solve` of a wrapper splits its memory, asks the inner policy, and returns the changed action:
 
         own, inside = self.split(memory)
         step = self.ask(batch, inside)
         return self.solution(step.qdot, own, step)
 
-    The inner policy acts as if it were alone: what is not finite or beyond the velocity limit is dealt with as its own
+    The inner policy acts as if it were alone: values not finite or beyond the velocity limit are dealt with as its own
     `predict` does. Its memory stands behind the wrapper's own.
 
     Args:
@@ -50,7 +50,7 @@ class Wrapper(SolverPolicy, abc.ABC):
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.memory(rows))
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
-        """See :meth:`SolverPolicy.restarted`; what the inner policy keeps is kept."""
+        """See :meth:`SolverPolicy.restarted`; the inner policy keeps its memory."""
         own, inside = self.split(memory)
         fresh = () if self.inner is None else self.inner.restarted(inside, rows)
         return *self.own_restarted(own, rows), *fresh

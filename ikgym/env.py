@@ -28,7 +28,7 @@ OPTIONS = ("q", "arm_seed", "step")
 
 
 class Arms:
-    """What single and vector environments share: scenario, states of the arms, their pictures, the specification."""
+    """The base of single and vector environments: scenario, states of the arms, their pictures, the specification."""
 
     def _set_arms(
         self,
@@ -200,7 +200,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
 
     @property
     def context(self) -> FloatArray:
-        """What the plant of the episode has drawn from ranges, see :class:`ikgym.plant.DrawnPlant`. Shape (c,)."""
+        """Numbers that the plant has drawn from ranges, see :class:`ikgym.plant.DrawnPlant`. Shape (c,)."""
         context: FloatArray = self._simulator.context[0].copy()
         return context
 

@@ -11,7 +11,7 @@ Member = TypeVar("Member")
 
 
 class Registry(Generic[Member]):
-    """Names, and functions that make the members: of what kind in messages, such as ``"arm"``, and of which class."""
+    """Names, and functions that make the members: their kind in messages, such as ``"arm"``, and their class."""
 
     def __init__(self, kind: str, member: type[Member]) -> None:
         self.kind, self._member = kind, member
@@ -64,7 +64,7 @@ class Registry(Generic[Member]):
         return self._made[name]
 
     def made(self, name: str, make: Callable[[], object]) -> Member:
-        """What a function makes, which need not be registered.
+        """The result of a function, which need not be registered.
 
         Args:
             name: Its name in messages.

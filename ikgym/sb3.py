@@ -198,7 +198,7 @@ class LearningVecEnv(RedundantIKVecEnv):
 
     Args:
         num_envs: N.
-        task: What is observed and rewarded, and what an action means.
+        task: Observation, action and reward.
         render_mode: None or `"rgb_array"`.
 
     Raises:

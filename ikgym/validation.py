@@ -226,7 +226,7 @@ Interval = Annotated[tuple[float, float], interval]
 
 @contextlib.contextmanager
 def about(what: object) -> Iterator[None]:
-    """Begins the messages of bad input with what they are about, such as a file."""
+    """Begins the messages of bad input with their subject, such as a file."""
     try:
         yield
     except InvalidInputError as error:

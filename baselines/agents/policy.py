@@ -53,8 +53,8 @@ class LearnedPolicy(SolverPolicy):
 
     Args:
         problem: The part of the scenario that the policy knows.
-        interval: Steps from one evaluation of the network to the next; that of its training if left out. What follows
-            from the network is held in between, with feedback in every step.
+        interval: Steps from one evaluation of the network to the next; that of its training if left out. The
+            output of the network is held in between, with feedback in every step.
     """
 
     interval: int | None = None

@@ -22,7 +22,7 @@ SPEEDING_UP = 0.2
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RobotOptions:
-    """The chain of a URDF file, and what the file does not say."""
+    """The chain of a URDF file, and the facts that the file does not state."""
 
     base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
     """Link of a URDF file at which the arm begins; the root if left out."""

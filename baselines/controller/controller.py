@@ -119,7 +119,7 @@ class Controller:
                 [m]. None where it is not measured: then it is the model's at q.
             reference: The pose wanted at the end of this period, and then as many as the policy looks ahead, see
                 :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
-            qdot: Measured joint velocities in [rad/s] or [m/s]; what was returned last if left out. Shape (n,).
+            qdot: Measured joint velocities in [rad/s] or [m/s]; the last command if left out. Shape (n,).
             q_age: Control periods since q was measured.
             pose_age: The same of the pose.
 
@@ -256,6 +256,6 @@ class Controller:
         return spent[1:]
 
     def _touch(self) -> None:
-        """Compiles what the first periods may not call: poses as rotation and position, and a stop."""
+        """Compiles kernels that the first periods may not call: poses as rotation and position, and a stop."""
         self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
         self._braked()

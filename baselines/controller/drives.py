@@ -22,7 +22,7 @@ from ikgym.validation import LARGEST, FloatArray, Frozen, number, shortened, who
 IDENTIFY = "identify"
 #: Logarithm of the likelihood ratio from which on identified drives are reported.
 EVIDENCE = 10.0
-#: The policy that predicts what drives do.
+#: The policy that predicts the drives.
 PREDICTED = "predicted"
 #: The longest delay that is identified, in periods.
 LONGEST = 12

@@ -37,7 +37,7 @@ class StopReason(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Guards(Frozen):
-    """Bounds of what a controller accepts, and how it stops.
+    """Bounds of the measurements that a controller accepts, and how it stops.
 
     Args:
         age: The oldest measurements, in control periods. Joint coordinates that do not change for so long, and for the
@@ -46,7 +46,7 @@ class Guards(Frozen):
             next, and lie outside their limits, in [rad] or [m].
         position_error: The largest distance of the tool from the reference, in [m]; None for any.
         orientation_error: The largest angle from it, in [rad]; None for any. With the tasks ``matrix`` and ``skew`` it
-            is the length of what coordinates differ by.
+            is the length of the difference of coordinates.
         stopping_time: In which time a joint stops from its velocity limit, or reaches it, where the model has no
             acceleration limit, in [s].
 

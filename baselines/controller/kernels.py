@@ -16,7 +16,7 @@ NOT_FINITE, STALE, JUMP, OUTSIDE, PATH_ERROR = range(1, 6)
 # Rows of bounds, and numbers, see :class:`baselines.controller.Guards`.
 LOWER, UPPER, WAY = range(3)
 AGE, TOLERANCE, POSITION, ORIENTATION, FROZEN = range(5)
-# Rows of what is remembered: joint coordinates, how far commands should have moved the joints since they changed.
+# Rows of the memory: joint coordinates, how far commands should have moved the joints since they changed.
 MEASURED, TRAVEL = range(2)
 # Counters: whether there was a measurement, its age, and for how many periods it has not changed.
 BEGUN, BEFORE, REPEATED = range(3)
@@ -24,7 +24,7 @@ BEGUN, BEFORE, REPEATED = range(3)
 
 @kernel
 def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, counters):
-    """The first guard that refuses what was measured.
+    """The first guard that refuses the measurements.
 
     Args:
         q: Joint coordinates in [rad] or [m]. Shape (n,).
@@ -37,7 +37,7 @@ def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, 
         bounds: Shape (3, n).
         numbers: Shape (5,).
         kept: The last measurement, changed in place. Shape (2, n).
-        counters: What is counted, changed in place. Shape (3,).
+        counters: Counters, changed in place. Shape (3,).
 
     Returns:
         The reason to stop; 0 if there is none.

@@ -18,7 +18,7 @@ Pose = npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]
 
 
 def numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
-    """An array of a shape, None for any length; what is one already is not copied, and may be not finite.
+    """An array of a shape, None for any length; such an array is not copied, and may be not finite.
 
     Raises:
         InvalidInputError: It is no array of numbers of that shape.

@@ -89,8 +89,8 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
-        Where the scenario has collisions, ``clearance`` (k,) in [m], and what
-        :func:`baselines.evaluation.motion.contacts.carried` gives for the replay.
+        Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of
+        :func:`baselines.evaluation.motion.contacts.carried` for the replay.
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1

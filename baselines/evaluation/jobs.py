@@ -44,7 +44,7 @@ class Options:
     policies: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ALL
     """Policies as :func:`baselines.evaluation.policies.specifications` takes them."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Test sets, which define what is played, instead of scenarios, episodes, split, steps and noise seeds."""
+    """Test sets, which define the episodes, instead of scenarios, episodes, split, steps and noise seeds."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Episodes of each random scenario: the first seeds of the split. Other scenarios are the same at every reset and
     have one episode, with seed 0."""
@@ -229,7 +229,7 @@ def _episodes(options: Options) -> list[_Episodes]:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
         if listed or changed:
             raise InvalidInputError(
-                f"A test set defines what is played: with {', '.join(map(repr, options.test_sets))}, expected no "
+                f"A test set defines the episodes: with {', '.join(map(repr, options.test_sets))}, expected no "
                 "scenarios, episodes, split, steps or noise_seeds."
             )
         sets = [test_sets.get(name) for name in options.test_sets]

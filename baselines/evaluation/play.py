@@ -47,7 +47,7 @@ def run(jobs: Sequence[Job], workers: Workers, *, progress: bool) -> Generator[t
     On a cluster nothing is timed: timed jobs are played here, after all others.
 
     Raises:
-        InvalidInputError: A policy refuses what it is shown, cannot be sent to a worker, or chooses an invalid action.
+        InvalidInputError: A policy refuses the observation, cannot be sent to a worker, or chooses an invalid action.
         WorkerError: Workers died repeatedly over one batch, or have another version of the code.
         ClusterError: There is no cluster.
     """
@@ -108,7 +108,7 @@ def play_episodes(
     """Plays episodes of a policy, in the wrapped environment if it needs one; with free timing, to the end of the path.
 
     Raises:
-        InvalidInputError: The policy refuses what it is shown, or chooses an invalid action.
+        InvalidInputError: The policy refuses the observation, or chooses an invalid action.
     """
     if isinstance(policy, ForeignPolicy) and policy.wrap is not None:
         return [play_wrapped(scenario, policy, one, timed=timed, tick=tick) for one in seeds]

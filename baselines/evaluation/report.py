@@ -19,7 +19,7 @@ from baselines.oracle import best_known
 WIDTH, WIDE = 120, 250
 REFERENCE_NOTE = "* reference: has privileged information"
 STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
-STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is what was used"
+STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is the one that occurred"
 TIMING_NOTE = (
     "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
     "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"

@@ -51,7 +51,7 @@ def evaluate(
     Raises:
         TypeError: There is no such option.
         UnknownNameError: There is no such scenario, policy, parameter, split, test set, format or cluster.
-        InvalidInputError: A value is out of range; a policy cannot be imported, refuses what it is shown, states no
+        InvalidInputError: A value is out of range; a policy cannot be imported, refuses the observation, states no
             preview, cannot be sent to a worker or chooses an invalid action; no policy suits any scenario; a test set
             has drifted or is given with options that it defines.
         ResultsError: `out` cannot be read or written, or its results cannot be continued; the file of an agent cannot

@@ -21,7 +21,7 @@ from ikgym.validation import FloatArray
 
 #: One line of a table: the name of each column and its value. Names end with the unit, such as `time_p50_us`.
 Record = Mapping[str, Any]
-#: What the episodes of a scenario are compared by.
+#: The quantities by which the episodes of a scenario are compared.
 RATIO, TOTAL = "cost ratio", "total cost"
 
 
@@ -47,7 +47,7 @@ def grouped(rows: Iterable[Row]) -> dict[tuple[str, str, str, int], list[Row]]:
 def summarise(rows: Iterable[Row]) -> list[dict[str, Any]]:
     """One record for each group of rows, see :func:`grouped` and :func:`record`.
 
-    Besides: `quantity`, what the episodes are compared by, which is the cost ratio if all of the scenario are known;
+    Besides: `quantity`, by which the episodes are compared: it is the cost ratio if all of the scenario are known;
     `cost_ratio` of the policy, None if it is not known; `ideal_cost_ratio`, its cost ratio on an ideal plant; and
     `times_ideal`, the geometric mean of its cost divided by that of the same seed there, with its interval.
     """
@@ -77,7 +77,7 @@ def record(label: str, rows: Sequence[Row], values: FloatArray) -> dict[str, Any
     """The record of a policy in a scenario.
 
     Args:
-        label: What the policy is called.
+        label: Name of the policy.
         rows: Its rows.
         values: The cost ratio or the total cost of each episode, one row per training seed. Shape (s, e).
 

@@ -4,8 +4,8 @@
 >>> optimum = solve("varga7-fast", how=Search(starts=100))
 
 The cost is exactly the environment's, its optimum is sought from many starts, and nobody certifies that there is no
-cheaper path: it is the best known one. What a cost ratio is stated against lies in `baselines/data/best_known.json`,
-and ``ikgym oracle --update`` brings that up to date.
+cheaper path: it is the best known one. Cost ratios are stated against `baselines/data/best_known.json`, which
+``ikgym oracle --update`` brings up to date.
 """
 
 from __future__ import annotations

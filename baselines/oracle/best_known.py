@@ -1,4 +1,4 @@
-"""The best known costs of single episodes, and what they are for: cost ratio = cost / best known cost.
+"""The best known costs of single episodes: cost ratio = cost / best known cost.
 
 They lie in `baselines/data/best_known.json`, one record a line. A record belongs to the content of its episode, see
 :func:`baselines.fingerprints.episode_hash`: where scenario, steps or cost have changed since it is none. The episode is
@@ -29,7 +29,7 @@ UPDATE = "ikgym oracle --update"
 #: A best known cost up to here is rounding: an arm that may move where costs do not count can come to zero, and no
 #: ratio to that means anything.
 MEANINGLESS = 1e-9
-#: By what share a cost must lie below the record to beat it; less may be rounding.
+#: The share by which a cost must lie below the record to beat it; less may be rounding.
 MARGIN = 1e-6
 #: How long to wait for another process that writes records, in [s]; it takes some milliseconds.
 PATIENCE = 30.0
@@ -133,7 +133,7 @@ def record(records: Iterable[Record], path: pathlib.Path = DATA) -> list[Record]
 
 
 def _better(records: Iterable[Record], known: Mapping[Key, Record]) -> dict[Key, Record]:
-    """The best of each episode, where it is better than what is known."""
+    """The best of each episode, where it is better than the best known."""
     kept: dict[Key, Record] = {}
     keys = {(one.hash, one.seed): key for key, one in known.items()}
     for new in records:

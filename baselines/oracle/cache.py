@@ -1,4 +1,4 @@
-"""Optima on disk: what took minutes to find is looked up the next time."""
+"""Optima on disk: a search of minutes is looked up the next time."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def solve(
         seed: The reset seed.
         how: How thoroughly is searched.
         arm_seed: Which arm moves; the seed's own if left out.
-        cached: Whether to look on disk first, and to keep there what was found.
+        cached: Whether to look on disk first, and to keep the result there.
         tick: Called now and then with the share of the work done since the last call.
         paths: Joint coordinates after each step by name, further starts, with which the disk is left alone.
             Shapes (steps, n).

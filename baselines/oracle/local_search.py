@@ -79,7 +79,7 @@ def improve(problem, settings, paths, improved, first, last):
 
 @kernel
 def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, last):
-    """Branches off each path again and again, and keeps what is cheaper.
+    """Branches off each path again and again, and keeps the cheaper one.
 
     A branch is a random change of the path, see :func:`branch_off`, that Newton's method makes a path of low cost.
 

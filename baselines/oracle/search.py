@@ -20,7 +20,7 @@ from ikgym.parallel import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-#: Raised by whoever changes what the search finds, or the fields of an optimum: older files count no more.
+#: Raise it with any change of the search's results or of the fields of an optimum: older files count no more.
 VERSION = 3
 #: Receding horizons whose paths are starts, too.
 HORIZONS: tuple[Mapping[str, Any], ...] = (
@@ -57,7 +57,7 @@ def search(
     done = tick or (lambda share: None)
     known = _known_paths(episode, bool(paths))
     known |= {name: episode.through(q) for name, q in (paths or {}).items()}
-    # Newton's method keeps the cheaper of a path and what it makes of it: no path may be cheap by passing a limit.
+    # Newton's method keeps the cheaper of a path and its improvement: no path may be cheap by passing a limit.
     known = {name: episode.feasible(path) for name, path in known.items()}
     starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
     done(0.1)
@@ -186,7 +186,7 @@ def finished(
 def improved(
     episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
 ) -> tuple[local_search.Improved, float]:
-    """Improves paths in place, in several threads; gives what became of them, and the CPU time in [s]."""
+    """Improves paths in place, in several threads; gives the improved ones, and the CPU time in [s]."""
     out, problem = local_search.Improved(*np.empty((2, len(paths)))), episode.on(grid)
     spent: list[float] = []
 
@@ -202,7 +202,7 @@ def improved(
 def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Joint coordinates and joint velocities of each step, and their cost in the environment."""
     limit = episode.scenario.largest_qdot
-    # Multipliers keep limits to rounding; what is left over would add up from step to step.
+    # Multipliers keep limits to rounding; the remainders would add up from step to step.
     qdot = np.clip(episode.commands(episode.feasible(path)), -limit, limit)
     q, cost = episode.play(qdot)
     return q, qdot, cost

@@ -30,7 +30,7 @@ class Wanted:
         draw: Which of its episodes.
         how: How thoroughly is searched.
         policies: Specs of policies whose paths are starts, too.
-        cached: Whether to look on disk first, and to keep there what was found.
+        cached: Whether to look on disk first, and to keep the result there.
     """
 
     scenario: Scenario

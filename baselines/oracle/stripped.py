@@ -1,4 +1,4 @@
-"""An episode on its true kinematics, without drives and sensors: what the best known costs of imperfect plants are of.
+"""An episode on its true kinematics, without drives and sensors: the best known costs of imperfect plants belong to it.
 
 A cost ratio is stated against the cheapest path that the very arm of the episode can go, and no policy that moves it
 through lagging drives or sees it through a noisy camera comes to 1. Scenarios of equal kinematics have the same best

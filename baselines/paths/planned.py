@@ -31,7 +31,7 @@ class Planned(FollowNominal):
         problem: The scenario as the policy knows it.
         seed: Not used: the path is the same at every reset.
         path: The planned joint path, one row a step, in [rad] or [m]. Shape (steps + 1, n).
-        largest: Largest motion of a revolute joint between two knots in [rad], where it is less than what nine tenths
+        largest: Largest motion of a revolute joint between two knots in [rad], where it is less than nine tenths
             of the velocity limits allow.
 
     Raises:

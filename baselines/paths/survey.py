@@ -29,8 +29,8 @@ SLOWEST, SLOWER = 30.0, (1.6, 2.5, 4.0, 6.5, 10.0, 16.0)
 SETTLED = 0.3
 #: Steps of such a play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
 FEWEST_STEPS, MOST_STEPS = 1000, 4000
-#: Timings that take no more than so many times what is asked count as the same. Joints nearer to a stop than the first
-#: of these rooms, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
+#: Timings that take at most so many times the requested time count as the same. Joints nearer to a stop than the first
+#: of these distances, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
 #: with more than the last share of a velocity limit, where accelerations are not limited.
 SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.3, 0.1
 #: A clearance in [m] below the first of these, less than `qp` keeps, is too small; more than the second is no better.
@@ -170,7 +170,7 @@ def survey(scenario: Scenario) -> Survey:
     begin = starts(ideal(scenario))
     branches = _branches(scenario, begin, 1.0)
     if sum(branch.whole for branch in branches) < 0.5 * len(branches):
-        # What is missed even in the slowest play is out of reach.
+        # Poses that even the slowest play misses are out of reach.
         _play_again(scenario, branches, [not branch.whole for branch in branches], SLOWEST)
     for factor in SLOWER:
         slowest = [branch.whole and branch.slowing == SLOWEST for branch in branches]

@@ -1,4 +1,4 @@
-"""What `predict` is given and gives: observations, checked and batched, and the state.
+"""Input and output of `predict`: observations, checked and batched, and the state.
 
 The state is a flat tuple of arrays, (status, iterations, *memory), each with a leading axis of B. Only this module
 needs to know the layout: :func:`pack` makes a state, `SolverPolicy.report` and `SolverPolicy.memory_of` read it.
@@ -83,7 +83,7 @@ def _refused(name: str, state: object, expected: Signature, rows: int) -> Invali
                 f"as {name}.predict returned, got {dtypes}."
             )
     return InvalidInputError(
-        f"state: expected what {name}.predict returned for a batch of {rows}, got {str(given)[:200]}."
+        f"state: expected the one that {name}.predict returned for a batch of {rows}, got {str(given)[:200]}."
     )
 
 
@@ -109,7 +109,7 @@ def replace_rows(memory: Memory, fresh: Memory, rows: npt.NDArray[np.bool_]) -> 
 
 
 _FLOAT = np.dtype(np.float64)
-#: The arrays of an observation, in the order of :class:`Batch`: the first five, or all, None for what is absent.
+#: The arrays of an observation, in the order of :class:`Batch`: the first five, or all, None for those absent.
 Parts = Sequence[Any]
 
 _parts = operator.itemgetter(*OBSERVED)
@@ -118,7 +118,7 @@ _parts = operator.itemgetter(*OBSERVED)
 class ObservationReader:
     """Turns observations into batches for one policy, and refuses those that are not good.
 
-    A policy is shown observations of the same shapes again and again: what is to be made of them is worked out once.
+    A policy is shown observations of the same shapes again and again: the steps to convert them are worked out once.
 
     Args:
         name: The policy's, for messages.
@@ -128,7 +128,7 @@ class ObservationReader:
 
     def __init__(self, name: str, problem: Problem, preview: Preview) -> None:
         self._name, self._problem, self._preview = name, problem, preview
-        #: The last shapes that were good, with what is to be made of them; replaced as a whole, for threads.
+        #: The last shapes that were good, with the steps to convert them; replaced as a whole, for threads.
         self._last: tuple[Any, int, bool, npt.NDArray[np.int64] | None] = (None, 0, False, None)
 
     def __call__(self, observation: Observation) -> tuple[Parts, int, bool]:
@@ -243,7 +243,7 @@ def not_finite() -> InvalidInputError:
 
 
 def as_floats(value: object) -> FloatArray:
-    """A C-contiguous float64 array; refuses what is no array of real numbers, such as strings.
+    """A C-contiguous float64 array; refuses anything but real numbers, such as strings.
 
     Read-only arrays are copied: the kernels would be compiled anew for them.
     """

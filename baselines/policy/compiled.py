@@ -94,7 +94,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         return action, (answer[:rows], answer[rows : 2 * rows], *kept)
 
     def _call(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Any, Memory, int]:
-        """Calls the kernel: actions, flat, the block of the answer, the next memory, and what the call returns."""
+        """Calls the kernel: actions, flat, the block of the answer, the next memory, and the result of the call."""
         call, block, numbers, n = self._kernel
         action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
         kept = tuple([array.copy() for array in memory])

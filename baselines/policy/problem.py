@@ -16,7 +16,7 @@ from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, Frozen, frozen_array
 
-#: Arrays with a leading axis of B: what a policy remembers, or a whole state, see :mod:`baselines.policy.arguments`.
+#: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
 Memory = tuple[npt.NDArray[Any], ...]
 
 

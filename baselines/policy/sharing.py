@@ -10,7 +10,7 @@ import numpy as np
 from baselines.policy.problem import Solution
 from ikgym.parallel import in_chunks
 
-#: Which threads work on a share of a batch. What they call in turn shares out no further: threads of one pool that
+#: Which threads work on a share of a batch. Calls within them are not shared out further: threads of one pool that
 #: wait for others of it wait forever.
 _sharing = threading.local()
 

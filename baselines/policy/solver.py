@@ -214,7 +214,7 @@ class SolverPolicy(Frozen, abc.ABC):
         return action[0] if single else action, after
 
     def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
-        """A memory, cleared where a joint velocity is no number; with what the start of an episode would leave."""
+        """A memory, cleared where a joint velocity is no number; with the values of the start of an episode."""
         lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
         return replace_rows(memory, self.memory(len(lost)), lost) if memory else memory
 

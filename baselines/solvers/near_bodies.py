@@ -102,7 +102,7 @@ def _other_end(body, vector):
 
 @uncounted
 def repel(distances, reaches, gradients, count, gain, velocity):
-    """Adds joint velocities that lead away from what is near, as a potential field does (Khatib 1986).
+    """Adds joint velocities that lead away from near bodies, as a potential field does (Khatib 1986).
 
     Each pair asks for the joint motion that would take it out of the distance of influence d*, (d* - d) ∇d / ‖∇d‖²,
     weighted by (1 - d / d*)²: it sets in smoothly. ``gain`` is in [1/s], ``velocity`` (n,) in [rad/s] or [m/s]; for the

@@ -87,7 +87,7 @@ def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, 
 
 
 def _actor(policy: Any) -> tuple[list[nn.Module], str]:
-    """The layers from features to actions, and what keeps actions within ±1.
+    """The layers from features to actions, and the squashing of actions to ±1.
 
     Raises:
         InvalidInputError: The policy is of another kind.

@@ -52,7 +52,7 @@ class Folder:
 
     def clear(self) -> None:
         """Removes the files of a run, but no others."""
-        # run.json first: what is left after a kill is no run without it.
+        # run.json first: without it, a folder after a kill is no run.
         events = self.tensorboard.glob("events.out.tfevents.*")
         for file in (self.run, self.checkpoint, self.history, self.agent, *events):
             file.unlink(missing_ok=True)

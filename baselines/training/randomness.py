@@ -19,7 +19,7 @@ def reseed(seed: int, segment: int | None) -> None:
     """Seeds the global generators of Python, NumPy and PyTorch, which Stable-Baselines3 draws from."""
     for_python, for_numpy, for_torch = sequence(seed, segment).generate_state(3).tolist()
     random.seed(for_python)
-    np.random.seed(for_numpy)  # noqa: NPY002  # what Stable-Baselines3 draws from
+    np.random.seed(for_numpy)  # noqa: NPY002  # Stable-Baselines3 draws from it
     torch.manual_seed(for_torch)
 
 

@@ -87,7 +87,7 @@ class Training:
         return about
 
     def _identity(self) -> dict[str, Any]:
-        """What the result depends on, for `run.json`."""
+        """All that the result depends on, for `run.json`."""
         config, settings = self.config, read(self.config)
         settings["n_timesteps"] = int(config.total_timesteps or settings["n_timesteps"])
         named = {"env": config.env, "algorithm": config.method, "seed": self.seed}

@@ -160,6 +160,6 @@ def _sliders(gui: Any, session: Session) -> list[Any]:
 
 
 def _set(control: Any, value: float) -> None:
-    """Shows a value if it differs: viser sends it in any case, and slow browsers would undo what users do."""
+    """Shows a value if it differs: viser sends it in any case, and slow browsers would undo the user's change."""
     if control.value != (shown := round(value, DIGITS)):
         control.value = shown

@@ -87,7 +87,7 @@ class Arm(Frozen):
             self._check()
 
     def _check(self) -> None:
-        """Checks what belongs together, and fills in what was left out."""
+        """Checks fields that belong together, and fills in those left out."""
         n = len(self.offsets)
         if n == 0:
             raise InvalidInputError("expected at least one joint, got none.")
@@ -218,7 +218,7 @@ class Arm(Frozen):
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (..., n).
-            obstacles: What stands around the arm, at its own place.
+            obstacles: Obstacles around the arm, where they stand.
 
         Returns:
             Distances in [m], below 0 where two bodies overlap and infinite where nothing can meet, of shape (...); and

@@ -48,10 +48,10 @@ class Neighbour(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bodies(Frozen):
-    """Spheres and capsules fixed to the links of an arm, its tool and what it holds among them.
+    """Spheres and capsules fixed to the links of an arm, to its tool and to a held object.
 
     A body is all that is within its radius of the segment from its start to its end; a sphere has both in one place.
-    Link 0 is the base, and link i what moves with joint i. The frame of a link has its origin in the joint, behind the
+    Link 0 is the base, and link i moves with joint i. The frame of a link has its origin in the joint, behind the
     offset of :class:`ikgym.Arm`, and is parallel to the base at q = 0; that of link 0 is the base itself.
 
     Two bodies can meet if they are on different links that are no neighbours, and are not named as a pair that is

@@ -20,7 +20,7 @@ _A = (-SINGULAR[0], -SINGULAR[1], -SINGULAR[2])
 _P = (math.sqrt(0.5), -math.sqrt(0.5), 0.0)
 # Nearer to SINGULAR than this, in (a + z)², the first direction is that there.
 _LEAST = 1e-24
-# Below this angle in [rad], series stand for what would be 0/0.
+# Below this angle in [rad], series replace 0/0.
 _SMALL = 1e-3
 
 
@@ -38,7 +38,7 @@ def across(x, y, z):
     if square > _LEAST:
         p = 2.0 * (_P[0] * sx + _P[1] * sy + _P[2] * sz) / square
     ux, uy, uz = _P[0] - p * sx, _P[1] - p * sy, _P[2] - p * sz
-    # Near SINGULAR s has lost digits: what is left along z is taken out, and the third direction follows from two.
+    # Near SINGULAR s has lost digits: the rest along z is taken out, and the third direction follows from two.
     along = ux * x + uy * y + uz * z
     ux, uy, uz = ux - along * x, uy - along * y, uz - along * z
     return ux, uy, uz, y * uz - z * uy, z * ux - x * uz, x * uy - y * ux

@@ -14,7 +14,7 @@ logger = logging.getLogger("ikgym")
 
 @contextlib.contextmanager
 def announced(what: str, patience: float = 2.0) -> Iterator[None]:
-    """Says so if what is inside takes long.
+    """Says so if the block takes long.
 
     Args:
         what: Name of the compiled part.

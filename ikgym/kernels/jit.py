@@ -1,6 +1,6 @@
 """How kernels are compiled: once each, cached on disk, without the interpreter lock, and never stale.
 
-numba looks at the file of a function alone to tell whether what it has on disk is still good. A kernel whose callee in
+numba looks at the file of a function alone to tell whether its machine code on disk is good. A kernel whose callee in
 another file has changed, or a constant from there, would go on running as it was. Here the stamp of a kernel is made
 of all that it may reach, and of this file.
 
@@ -68,7 +68,7 @@ def uncounted(function: Any) -> Any:
 
     numba counts the references of all arrays of a tuple, atomically, wherever it is passed on or a field is read: for
     paths of 2 knots this took half the time of a Newton step. An uncounted kernel allocates nothing, which numba
-    refuses, and returns no array, nor calls what returns one, which the tests look for: its references would be lost.
+    refuses, and returns no array nor calls a function that does, as tests check: its references would be lost.
 
     Args:
         function: Takes arrays, numbers and tuples of them, and returns numbers.
@@ -169,7 +169,7 @@ def _find(module: str, name: str, function: Any = None) -> Any:
 def _linked(compiled: Any) -> Any:
     """Hands callers the name of a large kernel instead of a copy; kernels within functions are copied as ever.
 
-    None of what is used here of numba's machine code is public.
+    Nothing that is used here of numba's machine code is public.
     """
     if not isinstance(compiled, Dispatcher):  # compilation is switched off
         return compiled
@@ -181,7 +181,7 @@ def _linked(compiled: Any) -> Any:
         dispatcher._compile_for_args = lambda *arguments: _entry(compiled)._compile_for_args(*arguments)
 
     def add_overload(result: Any) -> None:
-        # What a callee needs, its callers need: numba forgets it of what it loads from disk.
+        # Callers need all that a callee needs; numba forgets this for kernels from disk.
         if not compiled.targetoptions.get("_nrt", True) and _has_arrays(result.signature.return_type):
             raise TypeError(f"{function.__qualname__} does not count references, and returns an array.")
         library, symbol = result.library, result.fndesc.llvm_func_name
@@ -244,9 +244,9 @@ def _large(library: Any, symbol: str) -> bool:
 
 
 def _forgiving(call: Callable[..., Any], flush: Callable[[], None], function: Any) -> Callable[..., Any]:
-    """A call of numba's cache that goes without one where the disk is full or closed, and forgets what it cannot read.
+    """A call of numba's cache that does without it where the disk is full or closed, and discards unreadable files.
 
-    That may be damaged, or of an older version of the package with types that are gone.
+    They may be damaged, or of an older version of the package with types that are gone.
     """
 
     def tried(*arguments: Any) -> Any:
@@ -257,7 +257,7 @@ def _forgiving(call: Callable[..., Any], flush: Callable[[], None], function: An
                 flush()
                 return call(*arguments)
         except (OSError, *UNREADABLE) as e:
-            if kept_on_disk():  # said once: what hinders one kernel hinders most
+            if kept_on_disk():  # said once: most kernels have the same obstacle
                 logger.warning("Machine code cannot be kept on disk, and is compiled anew in each process: %s", e)
             _not_kept.add(f"{function.__module__}.{function.__qualname__}")
             return None
@@ -280,7 +280,7 @@ def _stamp(module: str) -> str:
 
 
 def _stamp_of_globals(function: Any) -> str:
-    """Stamps of what a function with globals of its own may reach; nothing for others, which their module covers."""
+    """Stamps of all that a function with globals of its own may reach; none for others, which their module covers."""
     if function.__globals__ is vars(sys.modules[function.__module__]):
         return ""
     origins = {_origin(value) for value in function.__globals__.values()} - {""}

@@ -1,4 +1,4 @@
-"""Kernels: what the limits of an arm make of joint velocities."""
+"""Kernels: joint velocities within the limits of an arm."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def applied(limits, q, command, last, dt, out):
         command: Joint velocities in [rad/s] or [m/s]. Shape (n,).
         last: Velocity applied in the previous step. Shape (n,).
         dt: Δt in [s].
-        out: Receives what is applied in this one. Shape (n,).
+        out: Receives those applied in this one. Shape (n,).
     """
     held = np.zeros((1, 3))
     for j in range(q.shape[0]):

@@ -97,7 +97,7 @@ def outcome(
 ) -> Outcome:
     """The parts of an outcome as views of one block of numbers, as each step fills a fresh one.
 
-    One block, since to allocate ten arrays and to hand them to a kernel takes longer than what the kernel does.
+    One block, since to allocate ten arrays and to hand them to a kernel takes longer than the kernel itself.
 
     Args:
         numbers: The block. Shape (N (2 n + m + p m + 9),), or (N (2 n + m + p m + 9 + 2 + h n + n + m + 5 + 16 o),)
@@ -106,9 +106,9 @@ def outcome(
         n: Joints of the arm.
         m: Task coordinates.
         p: Steps ahead that are shown.
-        h: Commands that are shown; None where the plant is ideal, and what is measured is what is true.
+        h: Commands that are shown; None where the plant is ideal, and measurements are true.
         o: Obstacles that are shown.
-        late: Whether what is measured may be of an earlier step, so that its age is shown.
+        late: Whether a measurement may be of an earlier step, so that its age is shown.
     """
     shown = parts(numbers, rows, n, m, p)
     none = numbers[:0].reshape(rows, 0)
@@ -152,7 +152,7 @@ def parts(numbers: Floats, rows: int, n: int, m: int, p: int) -> Any:
 
 
 def more_parts(numbers: Floats, rows: int, n: int, m: int, h: int, o: int) -> Any:
-    """The parts :class:`More` of what is left of a block, see :func:`outcome`."""
+    """The parts :class:`More` of the rest of a block, see :func:`outcome`."""
     commands = 2 * rows
     true_q = commands + rows * h * n
     true_pose = true_q + rows * n

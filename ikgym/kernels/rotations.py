@@ -117,7 +117,7 @@ def rotation_vector(rotation):
 
 @inner
 def vector_factor(w, x, y, z):
-    """By what the vector part of a unit quaternion with w >= 0 must be multiplied to be the rotation vector."""
+    """The factor from the vector part of a unit quaternion with w >= 0 to the rotation vector."""
     sine = math.sqrt(x * x + y * y + z * z)
     # At 0 the factor angle / sine tends to 2.
     return 2.0 * math.atan2(sine, w) / sine if sine > 0.0 else 2.0

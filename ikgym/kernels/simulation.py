@@ -64,7 +64,7 @@ class State(NamedTuple):
         step: Steps made in the episode. Shape (N,).
         frames: Nominal frames of the rows' episodes, or those that are near, see :mod:`ikgym.kernels.tasks`; shared
             where the first length is 1. Shape (N or 1, points, 12 or 3).
-        scratch: What a call of the kernel works with: a frame, nominal task coordinates and their error, at its
+        scratch: Working memory of the kernel: a frame, nominal task coordinates and their error, at its
             first row. Shape (N, 12 + m + e).
     """
 
@@ -139,7 +139,7 @@ def _tracking(kind, cost, frame, pose, nominal, error):
 
 @uncounted
 def show_row(constants, cost, state, row, pose, frame, shown):
-    """Shows where the tool of a row is, what lies ahead of it, its errors, and what the step costs.
+    """Writes the tool pose of a row, the reference ahead, its errors and the cost of the step.
 
     Args:
         constants: A :class:`Constants`.
@@ -147,7 +147,7 @@ def show_row(constants, cost, state, row, pose, frame, shown):
         state: A :class:`State`, with the row's step counted.
         row: Its number.
         pose: Receives the task coordinates. Shape (m,).
-        frame: Orientation of the tool and tool point in [m], of shapes (3, 3) and (3,); then what is worked with, of
+        frame: Orientation of the tool and tool point in [m], of shapes (3, 3) and (3,); then working memory of
             shapes (m,) and (e,).
         shown: A :class:`ikgym.kernels.outcome.Shown`, written in place.
     """

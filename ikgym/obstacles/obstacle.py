@@ -59,7 +59,7 @@ class Obstacle(Frozen, abc.ABC):
         return (self.name,)
 
     def _check(self) -> None:
-        """Checks what fields alone do not show."""
+        """Checks the fields together."""
         if not self.name:
             raise InvalidInputError("name: expected a text, got an empty one.")
         if self.motion is not None and self.motion.random:

@@ -33,7 +33,7 @@ class RandomBoxes(Obstacle):
     A box has edges of any length within a range, any angle about the vertical axis, and stands near the motion: it is
     drawn around a random point of a random body at a random step, and drawn anew until it is near to the arm at that
     step and the motion is clear of it by the margin, at each step and between the steps. So each episode has a clear
-    motion. Boxes may overlap each other. What the arm does to itself is not looked at. They are called `name 1`,
+    motion. Boxes may overlap each other. Collisions of the arm with itself are not checked. They are called `name 1`,
     `name 2`, … See :class:`Obstacle`.
 
     Args:

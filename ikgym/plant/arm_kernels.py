@@ -46,7 +46,7 @@ class Spread(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """What episodes draw from ranges, by the names of :class:`ikgym.Plant`. Shapes (k,)."""
+    """Numbers that episodes draw from ranges, by the names of :class:`ikgym.Plant`. Shapes (k,)."""
 
     bandwidth: Floats
     command_delay: Floats
@@ -215,7 +215,7 @@ def _shift(key, number, deviation, vector, out):
 
 @inlined
 def _tilt(key, number, deviation, axis, out):
-    """A unit vector that is tilted by a normal vector, of which what lies along it does nothing."""
+    """A unit vector that is tilted by the part of a normal vector across it."""
     if deviation == 0.0:
         for c in range(3):
             out[c] = axis[c]
@@ -240,8 +240,8 @@ def _to_unit(vector):
 def _begin_at(j, zero, prismatic, offsets, axes, tool, tool_rotation):
     """Makes a chain have a joint's coordinate ``zero`` where the joint's encoder says 0.
 
-    Rot(a, q + z) = Rot(a, q) Rot(a, z): what follows the joint is turned by its zero, and all link frames are parallel
-    to the base at q = 0 again.
+    Rot(a, q + z) = Rot(a, q) Rot(a, z): all links after the joint are turned by its zero, and all link frames are
+    parallel to the base at q = 0 again.
     """
     axis = axes[j, 0], axes[j, 1], axes[j, 2]
     if prismatic[j]:

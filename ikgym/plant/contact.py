@@ -103,7 +103,7 @@ def touches(contacts, chain, row, loaded, step, q):
     """Whether bodies of a row touch in its last step, in which joints and obstacles move evenly.
 
     Where they do not, the clearance at the end of the step is known afterwards; where they do, the pair is. Distances
-    change by no more than what joints and obstacles move: between two configurations that are farther from contact
+    change by no more than joints and obstacles move: between two configurations that are farther from contact
     than that, nothing touches.
 
     Args:

@@ -86,7 +86,7 @@ class Draws:
         Args:
             keys: One a row. Shape (k,).
             rows: The numbers of the rows. Shape (k,).
-            numbers: What the keys draw from ranges.
+            numbers: Drawn from ranges by the keys.
             out: Receives the arms.
         """
         draw_arms(self._spread, keys, rows, numbers.calibration, numbers.load, out)
@@ -99,7 +99,7 @@ class Draws:
         Args:
             keys: One a row. Shape (k,).
             rows: The numbers of the rows. Shape (k,).
-            numbers: What the keys draw from ranges.
+            numbers: Drawn from ranges by the keys.
             axes: Axes of the arms that were drawn. Shape (N, 2, n, 3).
             out: Receives both ends of the bodies in [m]. Shapes (N, 2, b, 3).
         """
@@ -107,7 +107,7 @@ class Draws:
         turn_bodies(self._spread, keys, rows, *factors, axes, shapes.links, (shapes.starts, shapes.ends), out)
 
     def numbers(self, keys: Keys) -> tuple[Numbers, FloatArray]:
-        """What is drawn from ranges, and the contexts. Shapes (k,), (k, c)."""
+        """Numbers drawn from ranges, and the contexts. Shapes (k,), (k, c)."""
         out, context = np.empty((len(Numbers._fields), len(keys))), np.empty((len(keys), len(self._plant.context)))
         draw_ranges(self._ranges, keys, out, context)
         return Numbers(*out), context

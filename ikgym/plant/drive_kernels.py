@@ -1,4 +1,4 @@
-"""Kernels: what the drives of a plant make of commands."""
+"""Kernels: the drives of a plant."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def filtered(drive, row, j, lag, velocity):
         drive: Velocities that drives had. Shape (N, n).
         row: The arm.
         j: The joint.
-        lag: The share of what is missing that a step makes up for.
+        lag: The share of the gap to the command that a step closes.
         velocity: The commanded velocity.
     """
     drive[row, j] += lag * (velocity - drive[row, j])

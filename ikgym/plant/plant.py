@@ -50,8 +50,8 @@ class Plant(Frozen):
     observed. Noise belongs to the measurement, and stays with it as long as it is shown.
 
     *Context.* Some numbers may be ranges (low, high), from which episodes draw uniformly, whole numbers with both ends
-    included: what they draw is the context of the episode, which `arm_seed` keeps. The reset's `info` has it, and the
-    observation of a learner that is shown it, see :class:`ikgym.rl.Task`.
+    included: the drawn numbers are the context of the episode, which `arm_seed` keeps. The reset's `info` has it, and
+    the observation of a learner that is shown it, see :class:`ikgym.rl.Task`.
 
     Args:
         zero: Standard deviation of the joints' zeros, in [rad] or [m]. A number, or one a joint.
@@ -81,7 +81,7 @@ class Plant(Frozen):
         pose_every: Steps from one measurement of the pose to the next. A number, or a range.
         pose_missing: Share of the measurements of the pose that are lost.
         from_middle: How far from the middle of their ranges numbers are drawn, from 0 in the middle to 1 at the ends:
-            (0, 0.5) is the inner half, (0.5, 1) what is outside of it.
+            (0, 0.5) is the inner half, (0.5, 1) the rest.
 
     Raises:
         InvalidInputError: A number is not finite, of the wrong sign or beyond 1e12, a share above 1, a range the wrong

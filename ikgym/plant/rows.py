@@ -174,7 +174,7 @@ class PlantRows:
             self._set(rows, numbers, context)
 
     def _set(self, rows: Integers, numbers: Numbers, context: FloatArray) -> None:
-        """Sets what rows have drawn from ranges."""
+        """Sets the numbers that rows have drawn from ranges."""
         self.context[rows] = context
         self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
         self.state.delay[rows] = numbers.command_delay

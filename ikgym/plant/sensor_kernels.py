@@ -1,4 +1,4 @@
-"""Kernels: what the sensors of a plant show."""
+"""Kernels: the sensors of a plant."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def measure_q(sensors, keys, row, step, q, kept, out):
         step: Steps made.
         q: Joint coordinates. Shape (N, n).
         kept: Measurements that are on their way. Shape (N, delay + 1, n).
-        out: Receives what is shown. Shape (N, n).
+        out: Receives the measurements. Shape (N, n).
 
     Returns:
         Steps since it was measured.
@@ -51,7 +51,7 @@ def missing(sensors, keys, number):
 
 @inlined
 def measure_pose(sensors, plant, row, kind, step, rotation, position):
-    """Measures a pose where it is time to, and takes over what has arrived.
+    """Measures a pose where it is time to, and takes over the newest that has arrived.
 
     Args:
         sensors: A :class:`ikgym.plant.step.Sensors`.

@@ -53,7 +53,7 @@ class PlantState(NamedTuple):
 
     Attributes:
         keys: Of the rows' streams of random numbers. Shape (N, 5).
-        lag: The share of what is missing to a velocity that a step makes up for, 1 without lag. Shape (N,).
+        lag: The share of the gap to a commanded velocity that a step closes, 1 without lag. Shape (N,).
         delay: Steps after which a command reaches the drive. Shape (N,).
         pose_noise: Standard deviation of each part of a measured position, in [m]. Shape (N,).
         pose_rotation_noise: The same of the rotation vector of the orientation, in [rad]. Shape (N,).
@@ -178,7 +178,7 @@ def _meet(contacts, chain, state, drive, row, loaded, moving, loading):
 
 @inlined
 def _show_contacts(contacts, row, k, counted, more):
-    """Shows the clearance of a row, what it costs, whether the row is stopped, its nearest pair, and its obstacles."""
+    """Writes the clearance of a row, its cost, whether the row is stopped, its nearest pair, and its obstacles."""
     more.clearance[row], more.stopped[row] = contacts.distance[row], contacts.stopped[row]
     more.proximity_cost[row] = proximity(contacts.proximity, contacts.distance[row]) if counted else 0.0
     for c in range(2):
@@ -227,7 +227,7 @@ def _recall(limits, commands, row, now, out):
 
 @inlined
 def _sense(sensors, plant, kind, state, row, frame, shown, more):
-    """Shows what the sensors do. The pose in the scratch is blurred for it, after all else is done with it."""
+    """Writes the measurements of the sensors. The pose in the scratch is blurred for them, at the end."""
     now, (rotation, position) = state.step[row], frame
     more.q_age[row, 0] = measure_q(sensors, plant.keys[row], row, now, state.q, plant.q, shown.q)
     arrived = measure_pose(sensors, plant, row, kind, now, rotation, position)

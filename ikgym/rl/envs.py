@@ -26,7 +26,7 @@ class LearningEnv(RedundantIKEnv):
     """One arm, for learning; `info` is that of :class:`ikgym.RedundantIKEnv`, whose costs are the benchmark's.
 
     Args:
-        task: What is observed and rewarded, and what an action means.
+        task: Observation, action and reward.
         render_mode: None, `"human"` (a window) or `"rgb_array"`.
 
     Raises:
@@ -58,7 +58,7 @@ class LearningVectorEnv(RedundantIKVectorEnv):
 
     Args:
         num_envs: N.
-        task: What is observed and rewarded, and what an action means.
+        task: Observation, action and reward.
         options: `autoreset_mode`, `render_mode` and `max_episode_steps` of :class:`ikgym.RedundantIKVectorEnv`.
 
     Raises:

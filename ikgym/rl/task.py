@@ -16,7 +16,7 @@ from ikgym.validation import Frozen, flag, float_array, number, shortened, whole
 
 @dataclasses.dataclass(frozen=True)
 class Task(Frozen):
-    """A scenario as a learning task: what is observed, what an action means, and what is rewarded.
+    """A scenario as a learning task: its observation, action and reward.
 
     *Actions.* ±1 is a share of the largest joint velocities, those that arm and scenario allow.
 

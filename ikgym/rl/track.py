@@ -1,4 +1,4 @@
-"""What a learner observes, does and is rewarded with, on N rows; a single environment is one row."""
+"""Observation, action and reward of a learner, on N rows; a single environment is one row."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Learner:
         """The observations after a reset; where no episode has begun, they are those of the last step.
 
         Args:
-            seen: What the environment shows.
+            seen: The observation of the environment.
             context: The contexts of the rows' episodes. Shape (N, c).
             begun: Rows whose episodes have begun. Shape (N,).
         """
@@ -83,7 +83,7 @@ class Learner:
 
         Args:
             rows: Their numbers. Shape (k,).
-            seen: What the environment has shown of each.
+            seen: The observation of each in the environment.
         """
         together = {key: np.array([one[key] for one in seen]) for key in seen[0]}
         features = self._features(together, self._context[rows])  # those of the episodes that have ended

@@ -1,4 +1,4 @@
-"""Kernels of the environments by id: what an agent sees of one arm, and its reward."""
+"""Kernels of the environments by id: observation and reward of one arm."""
 
 from __future__ import annotations
 

@@ -54,8 +54,8 @@ def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
     path = fields["trajectory"]
     if any(one.random for one in given) and not (path.random and path.joint_bound() is not None):
         raise InvalidInputError(
-            f"obstacles of scenario {name!r}: expected the trajectory of a random joint motion, which what is drawn "
-            f"keeps clear, got a {type(path).__name__}."
+            f"obstacles of scenario {name!r}: expected the trajectory of a random joint motion, which drawn boxes "
+            f"keep clear, got a {type(path).__name__}."
         )
     matters = bool(given) if collisions is None else flag("collisions", collisions)
     if matters and not len(arm.bodies):

@@ -62,7 +62,7 @@ def entered_states(
         steps: Steps after which k of them are entered, and 0 of the others.
 
     Returns:
-        Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond what the arm can have
+        Joint coordinates in [rad] or [m], and joint velocities in [rad/s] or [m/s], none beyond the limits of the arm
         applied. Shapes (k, n).
     """
     times = points[np.array([steps - 1, steps])].T.astype(np.float64) * scenario.dt

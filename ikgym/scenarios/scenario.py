@@ -52,7 +52,7 @@ class Scenario(Frozen, Surrounded):
         iterations_per_point: Steps for which the nominal points 1, 2, … are held; the last number holds for all later
             points. Errors and costs of a point count at its last step.
         plant: Deviations of the arm, its drives and its sensors from the data sheet; none by default.
-        obstacles: What stands or moves around the arm, at most 1000, with different names.
+        obstacles: Obstacles that stand or move, at most 1000, with different names.
         collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
             By default it is where there are obstacles.
         proximity: The cost of bodies that come near, in a scenario with collisions; none by default.

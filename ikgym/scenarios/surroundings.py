@@ -84,7 +84,7 @@ class Surrounded(Reference):
         )
 
     def obstacles_of(self, seed: int | None = None) -> tuple[Obstacle, ...]:
-        """The obstacles of an episode, where boxes stand in the place of what is drawn.
+        """The obstacles of an episode, with the boxes that were drawn.
 
         Args:
             seed: The reset seed; needed where an obstacle is drawn.

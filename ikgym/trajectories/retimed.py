@@ -17,7 +17,7 @@ from ikgym.validation import FloatArray, Numbers, float_array
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RetimedTrajectory(Trajectory):
-    """The poses of another trajectory at other times; the path in space stays exactly what it was.
+    """The poses of another trajectory at other times; the path in space stays exactly as it was.
 
     The time of the other trajectory is a piecewise cubic function of the new one, with given values and slopes. It
     stays where it is from the last time on.

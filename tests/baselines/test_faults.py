@@ -180,16 +180,20 @@ def test_bad_episode_starts(played, start):
 @pytest.mark.parametrize("state", [3, "a", (), {}, (None,) * 4, [np.zeros(1)] * 4, (np.zeros(1),) * 9])
 def test_bad_states(played, state):
     policy, observation, _ = played
-    with pytest.raises(InvalidInputError, match=r"state: expected what rhc_gradient.predict returned for a batch of 1"):
+    with pytest.raises(
+        InvalidInputError, match=r"state: expected the one that rhc_gradient.predict returned for a batch of 1"
+    ):
         policy.predict(observation, state)
 
 
 def test_a_state_of_another_batch_or_policy_is_refused(played):
     policy, observation, state = played
     batch = {key: np.stack([value] * 2) for key, value in observation.items()}
-    with pytest.raises(InvalidInputError, match=r"state: expected what rhc_gradient.predict returned for a batch of 2"):
+    with pytest.raises(
+        InvalidInputError, match=r"state: expected the one that rhc_gradient.predict returned for a batch of 2"
+    ):
         policy.predict(batch, state=state)
-    with pytest.raises(InvalidInputError, match=r"state: expected what dls.predict returned"):
+    with pytest.raises(InvalidInputError, match=r"state: expected the one that dls.predict returned"):
         baselines.make("dls", "varga7-fast").predict(observation, state=state)
 
 

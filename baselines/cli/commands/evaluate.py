@@ -34,7 +34,7 @@ class Arguments(Options):
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
     one of your own, also of a module in the current folder, or: all."""
 
-    #: What is played if neither scenarios nor test sets are given.
+    #: Played if neither scenarios nor test sets are given.
     fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"scenarios": ("varga7-fast",)}
 
     def __post_init__(self) -> None:
@@ -60,7 +60,7 @@ RULES = (
     Rule(
         ("--episodes", "--split", "--steps", "--noise-seeds"),
         lambda given: not given.test_sets,
-        "with --test-sets, which define what is played",
+        "with --test-sets, which define the episodes",
     ),
     Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
     Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),

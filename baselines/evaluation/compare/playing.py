@@ -29,12 +29,12 @@ LAG, DELAY = 0.02, 2
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Comparison:
-    """What solvers do on a path."""
+    """Results of solvers on a path."""
 
     dt: float  # the control period in [s]
     rows: Sequence[Row]  # rows of all solvers, path by path
     recommendation: Recommendation  # the solver to take
-    notes: Sequence[str]  # what else is to be known
+    notes: Sequence[str]  # further remarks
 
     def table(self, width: int = report.WIDTH) -> str:
         """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""

@@ -13,7 +13,7 @@ from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray
 
-#: The frame of what does not move.
+#: The frame of fixed objects.
 AT_REST = np.append(np.eye(3), np.zeros(3))
 
 

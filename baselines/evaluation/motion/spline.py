@@ -50,7 +50,7 @@ def smooth(q: FloatArray, dt: float) -> Points:
 
 
 def from_rest(q: FloatArray) -> FloatArray:
-    """What takes the velocity at the start from a motion, and gives the way back within some periods. Shape (k, n)."""
+    """A correction that removes the initial velocity of a motion, back at 0 within some periods. Shape (k, n)."""
     if len(q) < 3:
         return np.zeros_like(q)
     jump = 0.5 * (-3.0 * q[0] + 4.0 * q[1] - q[2])  # in one period

@@ -98,7 +98,7 @@ def learn_rows(kind, motion, seen, had, memory, jacobian):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Broyden(DampedLeastSquares):
-    """Learns from measured poses what the model does not know of the Jacobian (Broyden 1965, the "good" formula).
+    """Learns the error of the model's Jacobian from measured poses (Broyden 1965, the "good" formula).
 
     When the joints have moved by Δq and the measured pose by Δy, the estimate B takes the smallest change that
     explains it: B ← B + (Δy − B Δq) Δqᵀ / (Δqᵀ Δq + ε²). The shift asked for is turned into joint velocities with B
@@ -106,7 +106,7 @@ class Broyden(DampedLeastSquares):
     Δy is the change of position and the rotation vector from the pose before to the present one, in the base
     frame as the Jacobian is.
 
-    A rank-one formula learns along the motion only; across it B stays what it was. So what is learnt is a correction,
+    A rank-one formula learns along the motion only; across it B stays as it was. So it learns a correction,
     from 0, of the model's Jacobian at q; the formula acts on their sum. Broyden's method as it stands, where B only
     starts as the model's Jacobian, is lost on a long way or after a singular start.
 

@@ -16,8 +16,8 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, flag, number
 
-#: In squared standard deviations a measurement is expected to be e from what was expected. What it is farther than
-#: TOLERATED e adds up, and beyond ALARM the arm has changed: by noise alone about once in a million measurements.
+#: The squared innovation of a measurement, in standard deviations, has the mean e. The part above TOLERATED e adds up,
+#: and beyond ALARM the arm has changed: by noise alone about once in a million measurements.
 TOLERATED, ALARM = 2.0, 30.0
 #: Measurements after a sudden change before the next one: where all are surprises, the noise is larger than said.
 PAUSE = 20
@@ -51,8 +51,8 @@ class Calibrated(Corrected):
 
     An extended Kalman filter: the parameters start at 0, with the prior's standard deviations, and a measured pose y at
     the joint coordinates q improves them, θ ← θ + K (y − F(q, θ)), one component after the other, since their noises
-    are independent. What no posture tells apart stays with the prior, and does no harm: only the pose matters. The base
-    policy is shown the reference without the deviation F(q, θ) − F(q, 0) at the present q, see :class:`Corrected`.
+    are independent. Parameters that no posture tells apart stay at the prior and do no harm: only the pose matters. The
+    base policy is shown the reference without the deviation F(q, θ) − F(q, 0) at the present q, see :class:`Corrected`.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -71,7 +71,7 @@ class Calibrated(Corrected):
             are farther from what was expected than noise brings them (the sum of Page 1954). 0 for none.
         start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad]: where it
             has been jogged there, that is the best measurement of all. None where it may begin anywhere.
-        keep: Whether what is known of the arm survives the start of an episode, and is cleared with the state alone.
+        keep: Whether the estimate of the arm survives the start of an episode, and is cleared with the state alone.
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
@@ -139,7 +139,7 @@ def calibrate_rows(rule, q, pose, then, new, known, deviation, old):
         new: Whether they are new. Shape (B,).
         known: A :class:`CalibrationMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
-        old: Receives what they would be without the measurements. Shape (B, 6).
+        old: Receives the ones without the measurements. Shape (B, 6).
     """
     chain, kind, variances, walk, jump = rule
     n = q.shape[1]
@@ -167,15 +167,15 @@ def improve(arm, kind, rule, q, pose, parameters, covariance):
     Args:
         arm: The chain with the parameters.
         kind: Of task coordinates.
-        rule: Variances of the noises, of shape (e,); what is added to the variances of the joint zeros if the arm seems
-            to have changed, 0 for nothing; and what the measurements before were farther than expected.
+        rule: Variances of the noises, of shape (e,); the increase of the variances of the joint zeros if the arm seems
+            to have changed, 0 for none; and the excess of the innovations before.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         pose: Measured task coordinates. Shape (m,).
         parameters: Changed in place. Shape (p,).
         covariance: Changed in place. Shape (p, p).
 
     Returns:
-        What this measurement and those before were farther than expected, and whether the arm is taken to have changed.
+        The excess of this innovation and those before, and whether the arm is taken to have changed.
     """
     variances, jump, before = rule
     n, e, p = q.shape[0], variances.shape[0], parameters.shape[0]

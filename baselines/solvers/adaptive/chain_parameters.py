@@ -1,6 +1,6 @@
 """Kernels: an arm whose joint zeros, links and axes differ from those of its model, and how its pose depends on them.
 
-The parameters of an arm with n joints are p = 6 n + 3 numbers: what is added to the joint coordinates (n), to the
+The parameters of an arm with n joints are p = 6 n + 3 numbers: offsets of the joint coordinates (n), to the
 offsets from joint to joint and to the tool point (3 n + 3), and how far each axis is tilted in two directions across it
 (2 n). As on the plant, see :class:`ikgym.Plant`.
 """
@@ -99,7 +99,7 @@ def parameter_twists(chain, q, position, twist):
         _put(twist, i, _cross(axis, arm), axis)
         for j in range(2):
             direction = u if j == 0 else v
-            # A tilt turns what follows forth before the joint's own rotation, and back after it.
+            # A tilt turns all links after it before the joint's own rotation, and back after it.
             for k in range(3):
                 tilt[k] = 0.0
                 for c in range(3):

@@ -109,10 +109,10 @@ class Corrected(NamedWrapper, abc.ABC):
 
     With R = exp(δ) R̂(q) and p = p̂(q) + d, the arm reaches the reference (R*, p*) where the model reaches
     (exp(-δ) R*, p* - d). The base policy is shown that reference, ahead as far as it looks, and as `pose` that of its
-    own model at q: what it sees is as consistent as on an ideal plant, neither noisy nor late, whatever the sensors.
-    Subclasses estimate the deviation from measured poses and the joint coordinates where they were measured. What an
-    estimate changes by is blended in: poses that come one in many steps would make the reference jump, which policies
-    that plan only some Newton steps, or drives that lag, answer with swings.
+    own model at q: its observation is as consistent as on an ideal plant, neither noisy nor late, whatever the sensors.
+    Subclasses estimate the deviation from measured poses and the joint coordinates where they were measured. A
+    change of the estimate is blended in: poses that come one in many steps would make the reference jump, to which
+    policies that plan only some Newton steps, or drives that lag, answer with oscillations.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -142,10 +142,10 @@ class Corrected(NamedWrapper, abc.ABC):
             own: The wrapper's own memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
                 must not be changed in place.
             out: Receives the deviations at the present joint coordinates. Shape (B, 6).
-            old: Receives what they would be without the measurement. Shape (B, 6).
+            old: Receives the ones without the measurement. Shape (B, 6).
 
         Returns:
-            What is to be remembered.
+            The next memory.
         """
 
     def sensors(self, rows: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -160,7 +160,7 @@ class Corrected(NamedWrapper, abc.ABC):
         measured = recall(batch, self.problem.dt, own.before, own.age)
         rest = own.rest
         own = self.learn(batch, measured, own._replace(before=measured.before, age=measured.age), deviation, old)
-        # The motion of the arm is followed at once, what a measurement has changed little by little.
+        # The motion of the arm is followed at once, the change by a measurement little by little.
         stays = math.exp(-self.problem.dt / self.blend) if self.blend > 0.0 else 0.0
         rest = np.where(measured.first[:, None], 0.0, stays * (rest + old - deviation))
         own, shown = own._replace(rest=rest), deviation + rest

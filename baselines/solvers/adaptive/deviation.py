@@ -103,7 +103,7 @@ def missing_deviation(kind, measured, modelled, deviation, out):
         measured: Measured coordinates. Shape (m,).
         modelled: Those of the model at the same joint coordinates. Shape (m,).
         deviation: Estimate of the deviation. Shape (6,).
-        out: Receives what is missing. Shape (6,).
+        out: Receives the deviation. Shape (6,).
     """
     m = measured.shape[0]
     predicted, error = np.empty((1, m)), np.zeros(max(m, SIZE))
@@ -122,7 +122,7 @@ def missing_deviation(kind, measured, modelled, deviation, out):
 
 @inner
 def move_deviation(kind, change, deviation):
-    """Adds what is missing, or a share of it, to a deviation, in place: the product of rotations. Shapes (6,)."""
+    """Adds a missing deviation, or a share of it, to a deviation, in place: the product of rotations. Shapes (6,)."""
     for i in range(3):
         deviation[i] += change[i]
     if kind == SKEW:

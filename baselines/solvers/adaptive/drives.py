@@ -17,7 +17,7 @@ from ikgym.kernels.jit import inlined, kernel
 from ikgym.kernels.tasks import pose_rows
 from ikgym.validation import BoolArray, FloatArray, IntArray
 
-#: How much of a residual stays from step to step: what drifts, such as a bias, is no sign of a delay.
+#: How much of a residual stays from step to step: a drift, such as that of a bias, is no sign of a delay.
 HIGH_PASS = 0.98
 #: Standard deviations of the guess, in steps of delay and in steps of lag, in units of the noise of one measurement.
 DELAY_SPREAD, LAG_SPREAD = 4.0, 5.0
@@ -52,7 +52,7 @@ class PredictedMemory(NamedTuple):
         velocity: Of the simulated drives, in [rad/s] or [m/s]. Shape (B, L, n).
         path: Where they are now, and where they were 1, 2, … steps ago, in [rad] or [m]. Shape (B, L, H, n).
         residual: Difference between the measured joint coordinates and those that a delay and a lag would have led to,
-            without what is constant, in [rad] or [m]. Shape (B, D, L, n).
+            without the constant part, in [rad] or [m]. Shape (B, D, L, n).
         squares: Sums over time of its squares, and of its products with the residual of the next lag. Shape
             (B, D, L, 2).
         samples: How many numbers are in a sum. Shape (B,).

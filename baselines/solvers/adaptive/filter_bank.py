@@ -146,7 +146,7 @@ def bank_rows(rule, q, pose, then, new, known, deviation, old):
         new: Whether they are new. Shape (B,).
         known: A :class:`BankMemory`, changed in place.
         deviation: Receives the deviations. Shape (B, 6).
-        old: Receives what they would be without the measurements. Shape (B, 6).
+        old: Receives the ones without the measurements. Shape (B, 6).
     """
     chain, kind, variances, (rate, alike, each) = rule
     n, p = q.shape[1], known.estimates.shape[2]

@@ -29,7 +29,7 @@ class Servo(NamedTuple):
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
         change: How much they change at most in a step; inf where there is no limit. Shape (n,).
-        overdrive: How many times faster than what was wanted lately a command may be; inf where that does not matter.
+        overdrive: Largest ratio of a command to the velocities wanted lately; inf where that does not matter.
     """
 
     gain: float
@@ -63,11 +63,11 @@ def move_rows(limits, dt, wanted, q, qdot):
 
 @kernel
 def follow_rows(error, wanted, lags, servo, memory, qdot):
-    """Commands by which the joints move as wanted, and what the simulated drives make of them.
+    """Commands by which the joints move as wanted, and the velocities that the simulated drives make of them.
 
     A command is the velocity wanted and a share of the error, through the inverse of the lag. Where accelerations are
     limited, large errors are taken back no faster than the arm can stop: a share of them would overshoot ever more.
-    A command is at most so many times faster than what was wanted in the last second, or slow: the inverse of a lag
+    A command is at most so many times faster than the wanted velocity of the last second, or slow: the inverse of a lag
     makes peaks of steps, and a wrong one of errors.
 
     Args:

@@ -79,7 +79,7 @@ def absorb(sensitivity, error, variances, change, covariance):
         covariance: Changed in place. Shape (p, p).
 
     Returns:
-        The sum of squares of what was not expected, in its standard deviations: chi-square with e degrees of freedom;
+        The sum of squares of the innovations, in their standard deviations: chi-square with e degrees of freedom;
         and the logarithm of the product of the variances.
     """
     p, gain, surprise, size = change.shape[0], np.empty(change.shape[0]), 0.0, 0.0
@@ -105,7 +105,7 @@ def gain_of(row, variance, curvature, covariance, gain):
         curvature: By which share of its variance h · x is off where h is a derivative: the second order adds the noise
             that a second derivative of this size leaves. 0 where y is linear in x.
         covariance: Of x, changed in place. Shape (p, p).
-        gain: Receives what x has to change by for each unit by which y is beyond h · x. Shape (p,).
+        gain: Receives the change of x for each unit of the innovation y − h · x. Shape (p,).
 
     Returns:
         The variance of y.

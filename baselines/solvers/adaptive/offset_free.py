@@ -1,4 +1,4 @@
-"""Any policy, whose reference is shifted by what measured poses differ from those of the model."""
+"""Any policy, with a reference that is shifted by the difference of measured and predicted poses."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class OffsetFree(Corrected):
     when the pose was measured. The first measurements count alike, g = 1/k for the k-th, until that is below the gain.
 
     The deviation of a wrong model differs from posture to posture: a large gain follows it and lets the noise through,
-    a small one does the opposite. :class:`Calibrated` learns what is the same in all postures.
+    a small one does the opposite. :class:`Calibrated` learns errors that are the same in all postures.
 
     Args:
         problem: The scenario as the policy knows it.

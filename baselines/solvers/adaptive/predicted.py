@@ -38,10 +38,10 @@ class Predicted(NamedWrapper):
 
     A command takes effect ``delay`` steps late, and the velocity follows it through a lag of first order. The base
     policy therefore is shown the arm as it will be when its command takes effect: joint coordinates and velocities of
-    an arm of the model that does what it is told at once, within the limits, and the reference that belongs to that
+    an arm of the model that follows commands at once, within the limits, and the reference that belongs to that
     time, for which more of it has to be shown, see :attr:`preview`. So no delay is in its loop, whatever its gain
     (Smith 1957, with the delay-free part of the loop driven by the model). The pose that it sees is that of the model
-    plus what the measured pose differed by, filtered.
+    plus the filtered difference of the measured pose.
 
     The command is the velocity of that arm through the inverse of the lag, within the limits of velocity and
     acceleration, and a small share of the error that is predicted for the time when it takes effect: where the
@@ -166,7 +166,7 @@ class Predicted(NamedWrapper):
         return limit_rows(model, self.inner.problem.largest_qdot, problem.dt), tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
-        """Takes in what is measured, and tells how far the arm is from where the drives should have brought it."""
+        """Takes in the measurements, and tells how far the arm is from where the drives should have brought it."""
         share, problem = np.full(len(batch.q), self.gain), self.problem
         if not kept.begun.all():
             fresh = ~kept.begun

@@ -28,10 +28,10 @@ from ikgym.validation import FloatArray, as_given, number, per_joint
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
 #: Deformations of the joint coordinates, with their numbers in the kernel.
 DEFORMATIONS = {"rotation": 0, "contraction": 1}
-#: What the listing adds to a norm before division, and where it limits joint coordinates, by a tanh, in [rad] or [m];
+#: The listing's addition to a norm before division, and its bound of joint coordinates, a tanh, in [rad] or [m];
 #: neither is printed.
 EPSA, Q_PP_MAX = 1e-12, 1e3
-#: The paper's λ_a, and what it belongs to.
+#: The paper's λ_a, and its conditions.
 PAPERS_SHARE, PAPERS_MODEL, PAPERS_TASK = 5e-4, "khan8_approximate", "matrix"
 _JOINTS, _TASK, _CONTRACTION = COUNTER_ROTATIONS["joints"], COUNTER_ROTATIONS["task"], DEFORMATIONS["contraction"]
 _CONVERGED, _LIMIT, _NO_ROTATION = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.NOT_A_ROTATION)
@@ -151,7 +151,7 @@ def _turn_back(now, last, e_a, e_b, actual, desired):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AbstractRotation(CompiledPolicy):
-    """Turns q by a share of the rotation that leads from what is measured to what is wanted (eq. 3.16, section 4.1).
+    """Turns q by a share of the rotation that leads from the measured to the wanted vector (eq. 3.16, section 4.1).
 
     One call is one inner iteration, and the arm moves: with the Jacobian J̃ = ∂f/∂q of the model at q and the measured
     coordinates f, the next joint coordinates are

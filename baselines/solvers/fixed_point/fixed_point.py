@@ -60,8 +60,8 @@ class FixedPoint(CompiledPolicy):
         tolerance: ‖f(q) - x‖ after the last up to which the status is ``converged``, in [m] and [rad] or [1].
         components: Where no Jacobian is used, the number of the error's component, from 0, that corrects each joint;
             all in their order if left out. An arm with 2 joints in a plane has (0, 1).
-        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]; only with ``"transpose"``. Above 0. If left
-            out, chosen for the model, see :func:`baselines.solvers.arm_size.radian`.
+        length: ℓ, the length that 1 rad, or 1 in a rotation matrix, counts as, in [m]; only with ``"transpose"``.
+            Above 0. If left out, chosen for the model, see :func:`baselines.solvers.arm_size.radian`.
 
     Raises:
         InvalidInputError: A parameter is out of its range, or the transformation does not suit the task.

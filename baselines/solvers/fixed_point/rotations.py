@@ -11,7 +11,7 @@ import math
 from baselines.solvers.linear_algebra import dot
 from ikgym.kernels.jit import inner, kernel
 
-# A unit vector this close to another one, or to its opposite, spans no plane with it: what is left is rounding.
+# A unit vector this close to another one, or to its opposite, spans no plane with it: the rest is rounding.
 PARALLEL = 1e-15
 
 
@@ -130,7 +130,7 @@ def _make_orthogonal(vector, unit):
 
 @inner
 def _extend(vector, radius, out):
-    """Appends what makes the length R_a; False where the vector is too long for that."""
+    """Appends the number that makes the length R_a; False where the vector is too long for that."""
     n = vector.shape[0]
     left = radius * radius - dot(vector, vector)
     if not left > 0.0:

@@ -1,4 +1,4 @@
-"""What the iterations of Zhang 2020 share as policies: the choice of a damping rule, and its memory."""
+"""The common part of the iterations of Zhang 2020 as policies: the choice of a damping rule, and its memory."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     ``chan``         ½ weight ‖e‖²                                  weight
     ===============  =============================================  ==============================================
 
-    ``error_ratio`` and ``threshold`` are read literally: what an error does to λ shows in the iteration behind it.
+    ``error_ratio`` and ``threshold`` are read literally: an error changes λ in the iteration after it.
 
     Args:
         problem: The scenario as the policy knows it.
         rule: The rule for λ.
-        damping: λ, or λ of the first iteration, or what is added. In the square of the Jacobian's units, [m²] and
+        damping: λ, or λ of the first iteration, or the constant part. In the square of the Jacobian's units, [m²] and
             [1]; at least 0.
         growth: a₁. At least 1.
         decay: a₂. At least 1.
@@ -118,5 +118,5 @@ class DampedIteration(CompiledPolicy, abc.ABC):
         return DampingMemory(np.full(rows, self.law.damping), np.full(rows, np.inf))
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or what a stepped law made of it."""
+        """The remembered λ as ``lambda``, of shape (B,): of the last iteration, or after a stepped law."""
         return {"lambda": DampingMemory(*self.memory_of(state)).damping}

@@ -33,7 +33,7 @@ class DampingLaw(NamedTuple):
         dampings: λ by intervals of the error (rows) and of the condition number (columns). Shape (r, c).
         error_bounds: Where the rows meet, ascending. Shape (r - 1,).
         condition_bounds: Where the columns meet, ascending. Shape (c - 1,).
-        damping: λ of the first iteration of a stepped law; what a proportional one adds.
+        damping: λ of the first iteration of a stepped law; the constant part of a proportional one.
         weight: ω of a proportional law.
         growth: a₁ of a stepped law.
         decay: a₂ of a stepped law.

@@ -182,7 +182,7 @@ def _apply(steps, path, here):
 
 @inner
 def stop_run_away(here, start, longest, status):
-    """Marks a row that has not converged as diverged where a joint has left what it can reach in one period.
+    """Marks a row that has not converged as diverged where a joint has moved farther than it can in one period.
 
     Args:
         here: Joint coordinates in [rad] or [m]. Shape (n,).

@@ -1,4 +1,4 @@
-"""The quadratic program among bodies: what comes near is slowed down, so that it can brake before it touches."""
+"""The quadratic program among bodies: a body that comes near one is slowed down in time to stop before contact."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from ikgym.kernels.linear_algebra import cholesky
 from ikgym.validation import FloatArray
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
-# Share of the way to the clearance that a step may take, what is enough for joint motions that leave the task alone, in
+# Share of the way to the clearance that a step may take, the distance for joint motions in the null space, in
 # [1/s], and from which share of a gradient on they are the way out.
 APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
-# Share of what is missing to the clearance that a step takes back, and share of the acceleration limits that braking
+# Share of a missing clearance that a step takes back, and share of the acceleration limits that braking
 # reckons with: the joints have a task besides.
 RETREAT, BRAKES = 0.1, 0.5
 # A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of
-# the largest joint velocities and, in [1/s], of the way to a stop that lead away from what is near.
+# the largest joint velocities and, in [1/s], of the way to a stop that lead away from near bodies.
 LEVER, AWAY, TO_STOP = 0.05, 0.5, 3.0
 # A row that is met so closely holds the arm back, in [m/s].
 MET = 1e-9
@@ -40,7 +40,7 @@ class AmongBodiesNumbers(NamedTuple):
         program: Those of the quadratic program.
         clearance: The distance that is kept, in [m].
         influence: The distance from which on a pair is looked at, in [m].
-        repulsion: How strongly the joints are led away from what is near, in [1/s].
+        repulsion: How strongly the joints are led away from near bodies, in [1/s].
         bodies: See :class:`baselines.solvers.surroundings.Around`.
         boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
     """
@@ -99,8 +99,8 @@ def task_free(hessian, weight, projection):
 def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
-    ∇dᵀ q̇ is at least minus :func:`largest_approach`. What the joints can do aside from the task begins early and
-    gently, since they have little acceleration for it. What the task itself does, such as to lead the tool to a table,
+    ∇dᵀ q̇ is at least minus :func:`largest_approach`. Motions in the null space begin early and
+    gently, since they have little acceleration for it. Motions of the task itself, such as one of the tool to a table,
     is slowed down as late as braking allows.
 
     Each pair also asks for the joint motion aside from the task that would take it out of the distance of influence d*,

@@ -36,9 +36,9 @@ from ikgym.validation import FloatArray, number
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # Samples that the spline needs ahead.
 FEWEST = 4
-# The second solve aims at the speed that the first one reached, and takes back what the first one gave for speed.
+# The second solve aims at the speed that the first one reached, and takes back the error accepted for it.
 SOLVES = 2
-# What is aimed at for the speed of the reference, since the damping takes something off, and what is no progress.
+# The target for the speed of the reference, above it because of the damping, and the speed that counts as none.
 AMPLE, STUCK = 1.05, 1e-6
 # The speed that no limit of the path ahead goes below, the error in [m] or [rad] from which on the reference slows down
 # for the arm, and a short part of a step.

@@ -66,8 +66,8 @@ def path_speed(tangents, stride, part, last, fastest, change):
     """The largest speed along a path from which the arm can come to rest at its end within its limits.
 
     The square of the speed is bounded from the end to the start, as in time-optimal path parametrisation (Bobrow,
-    Dubowsky and Gibson 1985): by the velocity limits, by the bend of the joint path, and by what can be lost on the way
-    from one place to the next. It grows by no more than what the joints can make in one step.
+    Dubowsky and Gibson 1985): by the velocity limits, by the curvature of the joint path, and by the braking possible
+    from one place to the next. It grows by no more than the joints can in one step.
 
     Args:
         tangents: Joint motion for each step of the reference, at the place of the arm and further on. Shape (s, n).

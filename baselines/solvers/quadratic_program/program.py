@@ -66,7 +66,7 @@ def curvature(jacobian, weight, hessian):
 def feedback_share(hessian, jacobian, error, part, changes):
     """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
 
-    What a joint moves too fast for that, all of them are slowed down by, which keeps the direction. A ``part`` of the
+    If a joint is too fast for that, all are slowed down by one factor, which keeps the direction. A ``part`` of the
     largest ``changes`` of the velocity in one step, (n,), is reckoned with; H has shape (n, n), J Δt (e, n).
     """
     n = jacobian.shape[1]

@@ -63,7 +63,7 @@ class QuadraticProgram(VelocityProgram):
 
     With `task_scaling` the task shift is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
     w ρ ‖q̇ − z‖² is minimised over q̇ and s, with w = 0.01, so that direction comes before length, and length before
-    joint motion. Where the bounds allow s Δx, what is made is off its line by (1 − s) ‖Δx‖ / 10 at most, mostly by much
+    joint motion. Where the bounds allow s Δx, the motion leaves its line by (1 − s) ‖Δx‖ / 10 at most, mostly by much
     less. The price is singularities, where the arm may stand still or lead its joints astray.
 
     Such programs are the standard of differential inverse kinematics; with these limits in Flacco, De Luca and
@@ -76,7 +76,7 @@ class QuadraticProgram(VelocityProgram):
     way without the task. Bodies of the arm are looked at from a third of d* on. Obstacles are where they will be
     after the step. The program is solved by a dual active set, exactly (:func:`row_minimum`). Where no joint velocity
     within the limits has all rows, all v are raised by the same amount, the smallest that will do: the limits of the
-    joints are physical, and hold. z also leads away from what is near, aside from the task (:func:`keep_clear`), and to
+    joints are physical, and hold. z also leads away from near bodies, aside from the task (:func:`keep_clear`), and to
     the posture the less, the nearer it is. Only velocities of the next step are weighed, so that the arm may run into a
     dead end.
 
@@ -87,7 +87,7 @@ class QuadraticProgram(VelocityProgram):
         task_scaling: Whether to keep the direction of the task velocity.
         clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
         influence: Distance d* from which on they are slowed down, in [m]. Above `clearance`.
-        repulsion: K of the joint motion away from what is near, in [1/s], at least 0 and below 2/Δt.
+        repulsion: K of the joint motion away from near bodies, in [1/s], at least 0 and below 2/Δt.
 
     Raises:
         InvalidInputError: A number is out of its range.

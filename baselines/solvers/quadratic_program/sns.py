@@ -119,7 +119,7 @@ def sns_step(model, numbers, seen, memory, answer):
 class SaturationInNullSpace(ResolvedRate):
     """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
 
-    Each time the joint that would have to be slowed down the most is set to its bound, and what it makes is taken off
+    Each time the joint that would have to be slowed down the most is set to its bound, and its motion is subtracted
     the task for the others: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
     down instead, by the largest factor that was met on the way: the basic algorithm at velocity level (Flacco, De Luca
     and Khatib 2012, algorithm 1; 2015, section III), with the bounds of :func:`velocity_box`. It keeps the direction of

@@ -22,7 +22,7 @@ class DescentSettings(NamedTuple):
         steps: Most steps.
         alpha_min: Smallest α.
         alpha_max: Largest α.
-        alpha_factor: By what α grows or shrinks.
+        alpha_factor: Factor by which α grows or shrinks.
         difference: The finite difference δ of the joint velocities; 0 for the analytic gradient.
     """
 

@@ -27,8 +27,8 @@ class RecedingHorizonForesight(RecedingHorizon):
     """A preset of :class:`rhc.RecedingHorizon` for control periods of 1 ms, chosen on validation episodes.
 
     **Arms without limits.** One Newton step a period for the plan, and one for a restart candidate, which finds the way
-    out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: what a redundant arm does with
-    its null space now decides what motions seconds later cost. Its 56 blocks grow evenly, and reach that far without
+    out of local minima that a single plan would keep. The plan looks 3,000 steps ahead: motions of the arm in
+    its null space decide the cost of motions seconds later. Its 56 blocks grow evenly, and reach that far without
     skipping an oscillation. Blocks that grow geometrically do skip some: of 57 knots in 1,500 steps, half lie in the
     first tenth, and the last block has 127 steps. The first plan takes two periods, of four and six Newton steps.
     Each of the 22 after them tries another guess with ten, which is longer than a control period of 1 ms; of 3,000
@@ -64,7 +64,7 @@ class RecedingHorizonForesight(RecedingHorizon):
     name: ClassVar[str] = "rhc_foresight"
 
     def __post_init__(self) -> None:
-        """Settles what depends on the arm."""
+        """Settles the parameters that depend on the arm."""
         seconds = AHEAD_AMONG_BODIES if self.among_bodies else AHEAD
         ahead = {"horizon": 1 + max(1, round(seconds / self.problem.dt))}
         usual = LIMITED | ahead if self.interior_point else FREE

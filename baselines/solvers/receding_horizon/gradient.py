@@ -57,7 +57,7 @@ class RecedingHorizonGradient(SolverPolicy):
         iterations: Most steps of one descent.
         alpha_min: Smallest α.
         alpha_max: Largest α.
-        alpha_factor: By what α grows or shrinks. At least 1.
+        alpha_factor: Factor by which α grows or shrinks. At least 1.
         alpha_start: ``"restart"`` where α starts at `alpha_min` in each control period, ``"kept"`` where it goes on
             from the period before.
         warm_start: ``"unshifted"`` where a descent starts from the last plan as it was, ``"shifted"`` where that moves

@@ -57,7 +57,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
     M⁻¹ ∂Φ/∂q̇ with the plain gradient ∂Φ/∂q̇ along the constraints and ‖g‖² = (∂Φ/∂q̇)ᵀ M⁻¹ ∂Φ/∂q̇. Here
     M = I + Δt² LᵀL, L the lower triangle of ones, and CᵀC besides with ``states``, C the derivative of X by q̇. So an
     iterate equals the plain one preconditioned by M⁻¹: without ``states`` exactly but for rounding, with analytic
-    gradients and with differences (taken as Δt δ in the joint coordinates), with ``states`` but for what X is off. It
+    gradients and with differences (taken as Δt δ in the joint coordinates), with ``states`` but for the error of X. It
     equals the plain one itself only to the order Δt² HL², or ‖C‖²: M is nearly I because a state counts, in rad or m,
     as much as a velocity in rad/s. Differences of that size can change which way α goes, where two norms are nearly
     equal; the paths then separate for a while. Where Δt is 1 (``zhang3-helix``), M is far from I, and these are
@@ -70,7 +70,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         iterations: Most steps of one descent.
         alpha_min: Smallest α.
         alpha_max: Largest α.
-        alpha_factor: By what α grows or shrinks. At least 1.
+        alpha_factor: Factor by which α grows or shrinks. At least 1.
         alpha_start: ``"restart"`` or ``"kept"``.
         warm_start: ``"unshifted"`` or ``"shifted"``.
         gradient: ``"finite_difference"`` or ``"analytic"``.

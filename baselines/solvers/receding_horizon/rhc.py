@@ -40,7 +40,7 @@ MOST = 2**31 - 1
 class RecedingHorizon(CompiledPolicy):
     """Minimises the cost of Varga 2021 over a horizon of any length; the first joint velocity is applied.
 
-    A :class:`ikgym.ProximityCost` is no part of what it minimises.
+    A :class:`ikgym.ProximityCost` is not minimised.
 
     The unknowns are the joint coordinates at the knots of the horizon. In them the Hessian is block-tridiagonal, so
     that a damped Newton step costs time linear in the number of knots. The kinks of the cost, on which minima often

@@ -21,7 +21,7 @@ class Published(FollowNominal):
     """Goes along a published joint path, in straight lines from waypoint to waypoint.
 
     A reference, and no solver: an initial trajectory for an optimiser, as RL-ITG publishes it. The limits of the arm
-    act on it as on everybody; see :mod:`ikgym.problems` for what it is without them.
+    act on it as on everybody; see :mod:`ikgym.problems` for the rule without them.
 
     Args:
         problem: The scenario as the policy knows it.

@@ -1,4 +1,4 @@
-"""Any policy that is told the plant of its episode, which is privileged information: what it is worth to know it."""
+"""Any policy that is told the plant of its episode, which is privileged information: the value of knowing it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Told(NamedWrapper):
     """Hands another policy the arm that moves as its model, and the delay and the lag of its drives.
 
     A reference, not a contender: no observation shows the plant. It is no bound either, since the policy that is told
-    is as good as it is, sees what sensors show, and learns of a payload when it is taken up. Where drives are late the
+    is as good as it is, sees the measurements, and learns of a payload when it is taken up. Where drives are late the
     policy is wrapped in ``predicted``, with their delay and bandwidth.
 
     Args:

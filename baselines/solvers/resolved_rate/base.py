@@ -1,4 +1,4 @@
-"""Resolved rate: what all solvers share that answer a desired task velocity at each step."""
+"""Resolved rate: the base of all solvers that answer a desired task velocity at each step."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def orthonormal_rows(jacobian, shift, truncation, full_rank, out, deficient):
 
 @inner
 def _take_off(rest, wanted, a, unit, given):
-    """Takes the part along a unit vector off a row, and what that part makes off the row's demand."""
+    """Subtracts the part along a unit vector from a row, and its contribution from the row's demand."""
     part = dot(rest[a], unit)
     for k in range(unit.shape[0]):
         rest[a, k] -= part * unit[k]
@@ -104,16 +104,16 @@ class GramSchmidt(ResolvedRate):
     """A solution without a cost function, by Gram–Schmidt orthonormalisation: a RECONSTRUCTION.
 
     Khan 2020 (section 2, its reference 44) names a method that avoids the minimisation of any cost function by the
-    Gram–Schmidt algorithm. The original text is not at hand; what follows is this project's reading of that sentence.
+    Gram–Schmidt algorithm. The original text is not at hand; the rest is this project's reading of that sentence.
 
     The rows of J are orthonormalised one after another, the longest remainder first. A row a with the remainder
-    ρ u (u of unit length) asks for Δx_a; what the rows before it have given is taken off, and the rest,
+    ρ u (u of unit length) asks for Δx_a; the contribution of the rows before is subtracted, and the rest,
     divided by ρ, is given along u. So Δq lies in the span of the rows and makes Δx: without truncation and with
     full rank it is the Moore–Penrose solution, although no sum of squares was minimised. (Orthonormalised columns
     would make Δx too, but with joints that stand still.)
 
     Rows whose remainder is too short are left out: their coordinates are not tracked, those kept are tracked
-    exactly, unlike with the pseudoinverse, which spreads what cannot be made over all coordinates. The status then
+    exactly, unlike with the pseudoinverse, which spreads the error over all coordinates. The status then
     says ``rank_deficient``, and joint velocities jump where a row leaves or comes back. A task with redundant
     coordinates has at most six rows kept; which ones may change from step to step.
 

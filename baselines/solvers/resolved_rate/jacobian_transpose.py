@@ -92,8 +92,8 @@ class JacobianTranspose(ResolvedRate):
     W weighs position and orientation against each other: 1 for positions, a length ℓ for orientations. The direction
     is that of Wolovich and Elliott 1984 and of Balestrino, De Maria and Sciavicco 1984; the step
     α = ΔxᵀJJᵀΔx / ‖JJᵀΔx‖² is the one that Buss 2004 prints, here of W J and W Δx. In one step an arm makes all of Δx
-    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and what is
-    missing comes back through the measured error.
+    only where W J has equal singular values; elsewhere it lags behind, the more so the more they differ, and the rest
+    comes back through the measured error.
 
     Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
     the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
@@ -104,8 +104,8 @@ class JacobianTranspose(ResolvedRate):
         problem: The scenario as the policy knows it.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
-        length: ℓ, what 1 rad counts as, or 1 in a rotation matrix, in [m]. Above 0. If left out, chosen for the model,
-            see :func:`baselines.solvers.arm_size.radian`.
+        length: ℓ, the length that 1 rad, or 1 in a rotation matrix, counts as, in [m]. Above 0. If left out, chosen
+            for the model, see :func:`baselines.solvers.arm_size.radian`.
 
     Raises:
         InvalidInputError: The gain, the tolerance or the length is out of its range.

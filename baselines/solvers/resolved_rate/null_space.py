@@ -152,7 +152,7 @@ class NullSpace(MoorePenrose):
       and the smallest of them r_min; that is Liégeois's gradient, scaled so that K is the gain of the joint with
       the smallest range. Joints without two finite limits are left alone.
 
-    Where bodies matter, z also leads away from what is near, see :func:`repel`: an artificial potential (Khatib 1986)
+    Where bodies matter, z also leads away from near bodies, see :func:`repel`: an artificial potential (Khatib 1986)
     in the null space, as in Maciejewski and Klein 1985. Nothing keeps such an arm from touching something, least of all
     with its tool.
 

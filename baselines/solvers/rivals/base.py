@@ -34,7 +34,7 @@ class Seen(NamedTuple):
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (n,).
         start: Joint coordinates at the start of the episode. Shape (n,).
-        rotation: Of the model's tool at the end of the step; what the task leaves free stays as it is. Shape (3, 3).
+        rotation: Of the model's tool at the end of the step; the part that the task leaves free stays. Shape (3, 3).
         position: Of the model's tool at the end of the step, in [m]. Shape (3,).
     """
 
@@ -82,7 +82,7 @@ class Rival(SolverPolicy, abc.ABC):
     """
 
     rival: ClassVar[bool] = True
-    #: Threads would wait for each other: what the packages do in Python holds the interpreter lock.
+    #: Threads would wait for each other: the packages' Python code holds the interpreter lock.
     grain: ClassVar[int] = sys.maxsize
     #: Imported modules, and their names in :mod:`pip`.
     package: ClassVar[str]

@@ -14,7 +14,7 @@ from ikgym.kernels.rotations import quaternion
 from ikgym.validation import FloatArray
 
 BASE, TIP = "base", "tool"
-#: Stands in a URDF for a limit that is none: readers take what is beyond 1e20 for infinite.
+#: Stands in a URDF for a limit that is none: readers take numbers beyond 1e20 as infinite.
 NO_LIMIT = 1e21
 
 
@@ -79,7 +79,7 @@ def mjcf(arm: Arm, solids: Solids | None = None) -> str:
     Args:
         arm: The arm.
         solids: Its bodies and the obstacles. MuJoCo counts a moving base as none of the world, so that link 1 can meet
-            what is fixed to the world.
+            bodies fixed to the world.
     """
     solids = solids or Solids()
     body = f'<body name="{TIP}" pos="{_text(arm.tool)}" quat="{_text(quaternion(arm.tool_rotation))}">{_MASS}</body>'
@@ -120,7 +120,7 @@ def _geoms(solids: Solids, link: int) -> str:
 _MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 #: Half of the edges in [m] of the box that stands for a half-space: more than any arm reaches.
 _WIDE = 10.0
-#: Farther than a joint goes, and less than what MuJoCo takes for too large a number.
+#: Farther than a joint goes, and less than MuJoCo's largest number.
 _FAR = 1e9
 
 

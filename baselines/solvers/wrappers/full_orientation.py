@@ -70,7 +70,7 @@ def resolve_orientation(problem: Problem, batch: Batch, memory: OrientationMemor
         memory: Result of :func:`start_memory` or of the last call.
 
     Returns:
-        The observations as the task `pose` has them, and what is to be remembered.
+        The observations as the task `pose` has them, and the next memory.
     """
     rows, ahead = batch.nominal.shape[:2]
     pose, nominal = np.empty((rows, 12)), np.empty((rows, ahead, 12))
@@ -115,7 +115,7 @@ def resolve_one(coordinates, expected, frame):
     x, y, z = -coordinates[2], coordinates[1], -coordinates[0]  # sin θ · a
     square = min(x * x + y * y + z * z, 1.0)
     cosine = math.copysign(math.sqrt(1.0 - square), expected)
-    # (1 - cos θ) / sin² θ, the weight of what is symmetric, written so that small angles lose no digits. At 180° the
+    # (1 - cos θ) / sin² θ, the weight of the symmetric part, written so that small angles lose no digits. At 180° the
     # coordinates vanish, and do not tell the axis.
     weight = 1.0 / (1.0 + cosine) if cosine > 0.0 else (1.0 - cosine) / max(square, 1e-300)
     frame[0], frame[1], frame[2] = cosine + weight * x * x, weight * x * y - z, weight * x * z + y

@@ -56,7 +56,7 @@ def with_bodies(arm: Arm, tree: Tree, base: str, folder: Path | None) -> Arm:
 
 
 def _on_link(arm: Arm, path: list[Element], link: str, read: list[tuple[Element, Solid]]) -> tuple[int, list[Capsule]]:
-    """The number of the arm's link to which a link is fixed, and its capsules there, without what others contain."""
+    """The number of the arm's link to which a link is fixed, and its capsules there, without those inside others."""
     import pinocchio
 
     number = 0

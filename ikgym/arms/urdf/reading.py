@@ -49,8 +49,8 @@ def from_urdf(
     ``arm.replace(acceleration_limit=…)`` adds them. Joints off the chain, a gripper's for example, have no coordinate
     in the arm.
 
-    Collision geometry of the base and of all links below it becomes :attr:`Arm.bodies`, called after the links; what is
-    off the chain is fixed at the zero position of its joints. Spheres and capsules are exact. A cylinder becomes
+    Collision geometry of the base and of all links below it becomes :attr:`Arm.bodies`, called after the links; links
+    off the chain are fixed at the zero position of its joints. Spheres and capsules are exact. A cylinder becomes
     the capsule of its axis and radius, 4/3 π r³ larger; a box up to four capsules along its longest edge, or the sphere
     around it where that is smaller; a mesh the smallest capsule around its corners that a search finds. The log states
     the volumes, and the pairs that always touch, which are ignored.

@@ -56,7 +56,7 @@ class Tree:
         roots = [link for link in self.links if link not in self._above]
         if len(roots) > 1:
             raise InvalidInputError(f"expected one link without a joint above it, got {xml.listing(roots)}.")
-        # Each link has one joint above it, so what the root does not reach goes round in a loop.
+        # Each link has one joint above it, so links that the root does not reach form a loop.
         looping = set(self.links).difference(*map(self.below, roots))
         if looping:
             raise InvalidInputError(f"expected a tree of links, got a loop of {xml.listing(sorted(looping))}.")

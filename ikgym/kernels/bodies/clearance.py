@@ -13,7 +13,7 @@ from ikgym.kernels.jit import inlined, kernel, uncounted
 
 @inlined
 def _self_bound(shapes, placed, first, second):
-    """A distance that two bodies have at least, squared, and what is to be taken from its root."""
+    """A lower bound of the distance of two bodies: its square, and a length to subtract from its root."""
     x = placed[first, 6] - placed[second, 6]
     y = placed[first, 7] - placed[second, 7]
     z = placed[first, 8] - placed[second, 8]
@@ -97,7 +97,7 @@ def smallest(shapes, boxes, checked, placed, core, found):
 
 @inlined
 def _keep(found, first, second, count, near):
-    """Sorts a pair in among those that are kept, the nearest first; what is too many falls off the end."""
+    """Sorts a pair in among those that are kept, the nearest first; the last one drops out."""
     distances, pairs, vectors = near
     place = min(count, distances.shape[0] - 1)
     while place > 0 and distances[place - 1] > found[0]:
@@ -115,7 +115,7 @@ def _keep(found, first, second, count, near):
 def nearest(shapes, boxes, checked, placed, core, within, near):
     """The pairs that are nearer than some distance in [m], the nearest first, and how many there are, at most c.
 
-    ``near`` receives signed distances in [m], of shape (c,), where what is farther than the c nearest is left out;
+    ``near`` receives signed distances in [m], of shape (c,), of the c nearest pairs;
     pairs as in :func:`smallest`, of shape (c, 2); and unit vectors to the first body with the nearest point of its core
     in [m], of shape (c, 6). For the other arguments see :func:`smallest`.
     """

@@ -3,7 +3,7 @@
 The error is e = (position, length · rotation vector) in the base frame, J its Jacobian. A step minimises
 |e - J Δq|² + λ |Δq|² with λ in proportion to |e|² (Chan and Lawrence 1988; Sugihara 2011): cautious far from the pose,
 a Gauss–Newton step with its quadratic convergence close to it. A joint that a step would take past a limit goes there
-and no further, and the other joints make up for what is missing.
+and no further, and the other joints make up for the rest.
 """
 
 from __future__ import annotations

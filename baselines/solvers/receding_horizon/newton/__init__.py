@@ -1,6 +1,6 @@
 """Kernels: the cheapest joint path through the knots of a time grid.
 
-What a receding horizon plans at each step and what the oracle plans for a whole episode is the same problem: a joint
+A receding horizon solves at each step the problem that the oracle solves for a whole episode: a joint
 path that is piecewise linear in time. Its knots are the unknowns, its slopes the joint velocities.
 
 There are two Newton methods, and each is needed. Without limits the method of multipliers (:mod:`minimise`) takes a

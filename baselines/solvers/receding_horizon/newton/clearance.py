@@ -151,7 +151,7 @@ def clearance_excess(clearance, problem, path, workspace):
 
 @uncounted
 def wait_clear(clearance, problem, first, path, workspace):
-    """Makes a path wait in front of what it would touch, from knot ``first`` on; in place."""
+    """Makes a path wait in front of a body that it would touch, from knot ``first`` on; in place."""
     if clearance is None:
         return
     work, chain = workspace.clearance, problem.data.chain
@@ -193,7 +193,7 @@ def keep_clear(clearance, problem, qdot, work):
 def is_clear(clearance, chain, q, qdot, dt, work):
     """Whether nothing touches in the step that begins at q, in which all joints move evenly.
 
-    A distance changes by no more than what the joints move: where two configurations are farther from touching than
+    A distance changes by no more than the joints move: where two configurations are farther from touching than
     that, nothing touches in between. Obstacles are where they will be after the step.
 
     Args:

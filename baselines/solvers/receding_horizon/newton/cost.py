@@ -34,7 +34,7 @@ class Values(NamedTuple):
     Attributes:
         merit: The merit function.
         true: The cost itself, limits apart.
-        gap: By how much the true cost exceeds what the multipliers say, with each limit's share: 0 where the
+        gap: The excess of the true cost over the one by the multipliers, with each limit's share: 0 where the
             multipliers are those of a minimum.
     """
 

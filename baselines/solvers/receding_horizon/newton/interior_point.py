@@ -40,7 +40,7 @@ NEAR, ROUNDING = 1.0, 1e-13
 # The finest relative precision of the cost: below it the slacks of active limits are rounding.
 FINEST = 1e-9
 # w of the limits grows where one is left by more than this share of its scale, and by more than so many μ / w, which is
-# what μ alone may do: its multiplier would be above w. Where that does not help no path keeps them.
+# the effect of μ alone: its multiplier would be above w. Where that does not help no path keeps them.
 LEFT, BY_MU, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 10.0, 1e3
 # Lengths of a step tried one after the other.
 SHORTENING, TRIALS = 0.5, 16
@@ -55,7 +55,7 @@ def minimise_limited(problem, path, settings, smoothing, workspace):
         path: See :mod:`newton`; changed in place.
         settings: :class:`NewtonSettings`.
         smoothing: μ throughout, in units of the cost for each knot, for few steps from a path that is almost a minimum;
-            0 to follow it to what the tolerance asks for.
+            0 to follow it down to the tolerance.
         workspace: See :mod:`newton`.
 
     Returns:

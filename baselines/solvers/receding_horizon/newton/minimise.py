@@ -11,11 +11,11 @@ from baselines.solvers.receding_horizon.newton.newton_step import newton_step, p
 from ikgym.kernels.jit import inlined, uncounted
 
 CONVERGED, RAN_OUT, STALLED = 0, 1, 2
-# A decrease counts if it is this share of what the gradient promises (Armijo).
+# A decrease counts if it is this share of the decrease that the gradient predicts (Armijo).
 SUFFICIENT = 1e-4
-# The multipliers are updated where Newton's method promises less than this share of what they leave open.
+# The multipliers are updated where Newton's method predicts less than this share of the violation left.
 UPDATE_BELOW = 0.1
-# The penalties of the limits grow by a factor where an update leaves more than this share of what the one before left
+# The penalties of the limits grow by a factor where an update leaves more than this share of the violation before
 # open, and up to a bound.
 PENALTY_GROWTH, SLOW, LARGEST_PENALTY = 10.0, 0.3, 1e6
 # Lengths of a step tried one after the other.
@@ -111,7 +111,7 @@ def minimise(problem, path, multipliers, settings, workspace):
             if made >= settings.steps:
                 break
             if promised <= ROUNDING * abs(value):
-                # Rounding hides what is left to gain.
+                # The rest of the gain is below rounding.
                 outcome = CONVERGED if gap <= 10.0 * tolerance * true else STALLED
                 break
             damping = more_damping(damping)

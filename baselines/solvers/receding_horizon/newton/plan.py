@@ -1,4 +1,4 @@
-"""Kernels: the initial plan of an episode, what is left of a plan one step later, and restart candidates."""
+"""Kernels: the initial plan of an episode, the plan shifted by one step, and restart candidates."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def first_part(plan, knots):
 
 @uncounted
 def shift_plan(old_grid, plan, grid, workspace):
-    """Turns a plan into what is left of it one step later, in place; ``workspace.passed`` is set.
+    """Shifts a plan by one step, in place; ``workspace.passed`` is set.
 
     The plan has at least as many knots as either grid; the new grid is counted from one step later.
     """

@@ -259,7 +259,7 @@ def _first_velocity(problem, target, qdot):
     data, q, before, changes, kept = problem.data, problem.start, problem.qdot_before, problem.change_limit, True
     length, limited = problem.grid.length[0], changes.shape[0] > 0
     for j in range(q.shape[0]):
-        # A limit that holds the plan is kept to the tolerance only; what is no number stays none.
+        # A limit that holds the plan is kept to the tolerance only; NaN stays NaN.
         here, limit = target[j], data.velocity_limit[j]
         if here < data.lower[j]:
             here = data.lower[j]

@@ -33,11 +33,11 @@ VELOCITY_PENALTY = 300.0
 JOINT_PENALTY = 1e4
 # Velocities below this share of Δq̇ count as this share in the curvature of Φ^U, which vanishes at rest.
 LEAST_SPEED = 1e-3
-# A multiplier stays within this factor of what the barrier's gradient says (Wächter and Biegler 2006, eq. 16).
+# A multiplier stays within this factor of the barrier's gradient (Wächter and Biegler 2006, eq. 16).
 TRUSTED = 1e4
 
 
-# What is kept of a barrier: λ; and φ', what was taken for φ'', and u at the path before.
+# The memory of a barrier: λ; and φ', the value used for φ'', and u at the path before.
 MULTIPLIER, GRADIENT, CURVATURE, BEYOND = range(4)
 BARRIER_SIZE = 4
 
@@ -96,7 +96,7 @@ class TrackingTerm(NamedTuple):
         gradient: Its derivative by the error.
         curvature: Its second derivative by the error.
         multiplier: λ, brought up to date.
-        gap: The true cost of the kink less what its multiplier says.
+        gap: The true cost of the kink less the one by its multiplier.
     """
 
     value: float
@@ -230,7 +230,7 @@ def primal_dual_curvature(here, weight, multiplier):
 
 @inlined
 def trusted(multiplier, here, weight):
-    """The λ nearest to the one given for which λ and w - λ are not far from what φ' says."""
+    """The λ nearest to the one given for which λ and w - λ are not far from φ'."""
     rest = weight - here.gradient
     low = max(here.gradient / TRUSTED, weight - TRUSTED * rest)
     high = min(TRUSTED * here.gradient, weight - rest / TRUSTED)
@@ -253,7 +253,7 @@ class Bounded(NamedTuple):
 
 @inlined
 def one_side(barriers, k, i, side, u, weight, mu, advance):
-    """One bound; gives a :class:`Bounded`. λ goes on by what the primal-dual equations have said of this step."""
+    """One bound; gives a :class:`Bounded`. λ goes on by the primal-dual equations of this step."""
     here = smoothed(u, weight, mu)
     multiplier = here.gradient
     if advance >= 0.0:

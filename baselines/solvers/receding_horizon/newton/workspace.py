@@ -23,7 +23,7 @@ NO_LOAD: Floats = np.zeros((0, 0))
 
 
 class PathProblem(NamedTuple):
-    """From where, along what and through which knots a joint path is sought.
+    """Start, reference and knots of the joint path that is sought.
 
     Attributes:
         data: Arm, task, cost and limits.
@@ -32,7 +32,7 @@ class PathProblem(NamedTuple):
         nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
         qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
             cost something. Shape (n,).
-        rate_weight: What changes of velocity cost, in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; see :mod:`cost`.
+        rate_weight: Weight of changes of velocity, in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; see :mod:`cost`.
         change_limit: Largest changes of the joint velocities in one step, in [rad/s] or [m/s]; inf where a joint has
             none. Shape (n,), for the interior point method, or (0,), for multipliers, which cannot limit them.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot; read where
