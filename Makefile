@@ -52,7 +52,8 @@ check: $(STAMP) ## All that CI runs: format, lint, types, layers, tests, slow te
 	$(MAKE) --no-print-directory lint
 	$(MAKE) --no-print-directory types
 	$(MAKE) --no-print-directory layers
-	$(PYTEST)
+	$(MAKE) --no-print-directory test
+	$(MAKE) --no-print-directory slow
 
 docs: results/demo/report.html ## Build the documentation as a site in results/site; a broken link or reference fails
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

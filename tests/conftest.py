@@ -12,11 +12,6 @@ settings.register_profile("ikgym", deadline=None, derandomize=True, database=Non
 settings.load_profile("ikgym")
 
 
-def pytest_collection_modifyitems(items):
-    """Slow tests come last: many start processes, each of which would compile kernels that are not there yet."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
-
-
 @pytest.fixture(scope="session", autouse=True)
 def optima_of_our_own(tmp_path_factory):
     """Tests neither read nor fill the user's folder of optima."""
