@@ -102,7 +102,7 @@ def test_messages_name_a_class_without_a_name():
     baselines.register("looking", Looking)
     with pytest.raises(InvalidInputError, match="Looking needs to be shown 2 steps ahead"):
         evaluate("zhang3-helix", "looking", steps=3, preview=1)
-    with pytest.raises(InvalidInputError, match=r"what Looking\.predict returned"):
+    with pytest.raises(InvalidInputError, match=r"the one that Looking\.predict returned"):
         baselines.make("looking", "zhang3-helix")._recall((1,), None, 1)
 
 

@@ -23,6 +23,7 @@ from baselines.training.folder import read_run
 from baselines.training.seeds import RunOptions, train_seeds
 from baselines.workers import Workers
 from ikgym import rl, scenarios
+from ikgym.exceptions import InvalidInputError
 from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
@@ -150,6 +151,8 @@ def parse(arguments: Sequence[str]) -> Command | ByRewards[Any]:
     given = list(arguments) or ["--help"]
     if given[0] not in ("-h", "--help"):
         known_name("method", given[0], methods.METHODS)
+        if given[0] != APG.method and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in given}:
+            raise InvalidInputError(f"{given[0]} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
     preset = _value_of("--preset", given) if given[0] == APG.method else None
     kinds = [_subcommand(kind, preset) for kind in methods.METHODS.values()]
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time

@@ -82,7 +82,7 @@ def test_a_rod_passes_the_elbow():
 
 def test_obstacles_are_those_of_the_observation():
     """Rows of a batch with other obstacles plan otherwise, and each as alone."""
-    box = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.1] * 3, [0.1] * 3, 1, 0.02, 0.1)
+    box = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.1] * 3, [0.1] * 3, 0.02, 0.1, count=1)
     scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS, obstacles=[box])
     policy = baselines.make("rhc", scenario, horizon=200, move_blocks=12, iterations=5)
     env = ikgym.RedundantIKEnv(scenario, preview=policy.preview)
