@@ -109,8 +109,14 @@ class Recorder(gym.Wrapper[Any, Any, Any, Any]):
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
+        self.seeds: list[int | None] = []
         self.actions: list[npt.NDArray[Any]] = []
         self.costs: list[float] = []
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begins the episode and records the seed."""
+        self.seeds.append(seed)
+        return self.env.reset(seed=seed, options=options)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Makes one step and records it."""
@@ -147,8 +153,13 @@ def play_wrapped(
         raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
     env, recorder = policy.environment(scenario)
     seen, _ = env.reset(seed=seeds.seed)
+    if recorder.seeds != [seeds.seed] or recorder.actions:
+        raise InvalidInputError(
+            f"wrap: expected reset(seed={seeds.seed}) to reach the environment once and no step to be made, got resets "
+            f"with the seeds {recorder.seeds} and {len(recorder.actions)} steps."
+        )
     state, times, over = None, [], False
-    while not over:
+    while not over and len(recorder.actions) < scenario.steps:
         begin = time.perf_counter_ns()
         action, state = policy.predict(seen, state)
         times.append(time.perf_counter_ns() - begin)
@@ -164,7 +175,7 @@ def play_wrapped(
     if not np.array_equal(episode.tracking_cost, recorder.costs):
         raise InvalidInputError(
             f"wrap: expected the episode of {scenario.name} with seed {seeds.seed} from its start, got another one: a "
-            "wrapper resets without the seed, with options, or makes steps in a reset."
+            "wrapper resets with options or during the episode."
         )
     return dataclasses.replace(episode, time_ns=np.array(times if timed else [], dtype=np.int64))
 

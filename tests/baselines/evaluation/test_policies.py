@@ -300,19 +300,46 @@ class NoSeed(gym.Wrapper):
 
 class Skipping(gym.Wrapper):
     def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed, options={"step": 3})
+
+
+class Elsewhere(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed, options={"q": np.full(7, 0.1)})
+
+
+class Warm(gym.Wrapper):
+    def reset(self, *, seed=None, options=None):
         self.env.reset(seed=seed)
-        return self.env.reset(options={"step": 3})
+        observation, *_, info = self.env.step(np.zeros(7, np.float32))
+        return observation, info
+
+
+class Endless(gym.Wrapper):
+    """Begins again where the episode ends, and says nothing."""
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        if truncated:
+            observation, info = self.env.reset()
+        return observation, reward, terminated, False, info
 
 
 def test_wrappers_that_change_the_episode_are_refused():
     for wrap, message in (
         (lambda env: 3, "wrap: expected the environment that it was given in wrappers, got 3"),
         (lambda env: gym.wrappers.TimeLimit(env, 5), "ended after 5 of 20 steps"),
-        (NoSeed, "expected the episode of varga7-random with seed 2000000 from its start, got another"),
+        (NoSeed, r"expected reset\(seed=2000000\) to reach the environment once .* got resets with the seeds \[None\]"),
+        (Warm, r"no step to be made, got resets with the seeds \[2000000\] and 1 steps"),
+        (Elsewhere, "expected the episode of varga7-random with seed 2000000 from its start, got another"),
         (Skipping, "ended after 17 of 20 steps"),
     ):
         with pytest.raises(InvalidInputError, match=message):
             evaluate("varga7-random", Borrowed("varga7-random"), steps=STEPS, wrap=wrap)
+    (whole,), (endless,) = (
+        evaluate("varga7-random", Borrowed("varga7-random"), steps=STEPS, wrap=wrap) for wrap in (None, Endless)
+    )
+    assert numbers(endless) == numbers(whole)
 
 
 # Models of Stable-Baselines3
