@@ -79,7 +79,7 @@ class Command(Generic[P]):
         manual: Makes the text of ``--help`` above the options, given the name of the program.
         work: Does the work, given the options and the whole command line; returns the exit code, or None for 0.
         rules: Options that have an effect only together with others.
-        kept: The message after Ctrl-C, with ``{out}`` for the folder.
+        kept: The message after Ctrl-C, with ``{out}`` for the folder; left out where no folder is given.
         module: The module that is the same command, if Python runs it.
     """
 
@@ -99,8 +99,8 @@ class Command(Generic[P]):
         def both() -> int:
             nonlocal stopped
             options = parse(self.options, given, prog=prog, description=self.manual(prog), rules=self.rules)
-            if self.kept:
-                stopped = f"Stopped. {self.kept.format(out=getattr(options, 'out', None))}"
+            if self.kept and (out := getattr(options, "out", "")) is not None:
+                stopped = f"Stopped. {self.kept.format(out=out)}"
             for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
                 if (value := getattr(options, name, None)) is not None:
                     whole_number(name, value, at_least=1, at_most=most)

@@ -119,6 +119,9 @@ def searches(
     seeds, ranges = scenarios.seeds(SPLIT, episodes), {**read(RANGES), **({} if file is None else read(file))}
     whole_number("seed", seed, at_least=0)
     found = [Search(scenario, spec, of(spec, ranges), seeds, seed) for spec in policies or ranges]
+    names = {one.spec.partition(":")[0] for one in found}
+    if file is not None and names.isdisjoint(spec.partition(":")[0] for spec in read(file)):
+        raise InvalidInputError(f"{file}: expected ranges of a solver that is searched, {', '.join(policies)}.")
     if not policies:
         found = [one for one in found if _suits(one)]
     for one in found:

@@ -169,6 +169,13 @@ def test_invalid_ranges(tmp_path, text, error, message):
         tuning.searches(SHORT, [text[1:].partition("]")[0]], file)
 
 
+def test_ranges_of_solvers_that_are_not_searched(tmp_path):
+    (tmp_path / "ranges.toml").write_text("[mfac]\ndamping = { low = 0.1, high = 1.0 }")
+    with pytest.raises(InvalidInputError, match="expected ranges of a solver that is searched, dls"):
+        tuning.searches(SHORT, ["dls"], tmp_path / "ranges.toml")
+    tuning.searches(SHORT, ["dls", "mfac"], tmp_path / "ranges.toml")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -22,6 +22,9 @@ from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.rendering import Renderer
 from ikgym.validation import number, whole_number
 
+#: Most pictures of a video: about an hour.
+MOST_PICTURES = 100_000
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Options(EpisodeOptions):
@@ -63,8 +66,13 @@ def _work(options: Options, _: str) -> None:
         raise InvalidInputError(f"width: expected a multiple of 4 in [px], got {width}.")
     between = number("speed", options.speed, above=0.0) / number("fps", fps, at_least=0.1, at_most=1000.0)
     stage = Stage.of(options.scenario, options.seed, options.steps)
+    last = stage.scenario.steps
+    if last * stage.scenario.dt > MOST_PICTURES * between:
+        raise InvalidInputError(
+            f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {options.speed:g}."
+        )
     check_writable(options.out.absolute().parent)
-    replays, last = play_all(stage, options.policy), stage.scenario.steps
+    replays = play_all(stage, options.policy)
     steps = np.append(np.rint(np.arange(0.0, last, between / stage.scenario.dt)), last).astype(np.int64)
     across = min(len(replays), 2)
     size = across * width, -(-len(replays) // across) * width // 2

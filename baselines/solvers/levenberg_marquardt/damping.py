@@ -207,8 +207,8 @@ def damping_law(rule: str, parameters: Mapping[str, Any]) -> DampingLaw:
     """
     errors = frozen_array("error_bounds", parameters.get("error_bounds") or np.empty(0))
     conditions = frozen_array("condition_bounds", parameters.get("condition_bounds") or np.empty(0))
-    damping = parameters.get("damping") or 0.0
-    dampings = np.atleast_2d(frozen_array("dampings", parameters.get("dampings") or damping))
+    damping, table = parameters.get("damping") or 0.0, parameters.get("dampings")
+    dampings = np.atleast_2d(frozen_array("dampings", damping if table is None else table))
     if dampings.shape != (len(errors) + 1, len(conditions) + 1):
         raise InvalidInputError(
             f"dampings: expected {len(errors) + 1} x {len(conditions) + 1} numbers, one more each way than there "

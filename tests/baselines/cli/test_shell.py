@@ -1,5 +1,6 @@
 """How commands end: exit codes, missing extras, closed pipes."""
 
+import dataclasses
 import subprocess
 import sys
 
@@ -23,6 +24,25 @@ def test_exit_codes(capsys):
     assert capsys.readouterr().err == "error: Nothing fits.\n"
     assert shell.run(failing(KeyboardInterrupt()), lambda: "Stopped; all is kept.") == 130
     assert capsys.readouterr().err == "\nStopped; all is kept.\n"
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """A folder that may be left out."""
+
+    out: str | None = None
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [([], "Stopped."), (["--out", "x"], "Stopped. Finished work is in x; continue with --resume.")],
+)
+def test_ctrl_c_names_the_folder_if_there_is_one(words, message, capsys):
+    def work(given, line):
+        raise KeyboardInterrupt
+
+    assert shell.Command("evaluate", Options, lambda prog: "", work, kept=shell.RESUMED)(words) == 130
+    assert capsys.readouterr().err == f"\n{message}\n"
 
 
 def test_a_missing_extra_is_named(capsys):

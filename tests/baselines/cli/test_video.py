@@ -48,6 +48,7 @@ def test_the_command_writes_a_video(speed, count, tmp_path, capsys):
         *((["--width", width], "width: expected") for width in ("476", "481", "3844")),
         (["--fps", "0"], "fps: expected"),
         (["--speed", "-1"], "speed: expected"),
+        (["--speed", "1e-9"], "fps, speed: expected at most 100000 pictures, got fps 30 and speed 1e-09."),
         (["--policy", "dls", "dlss"], "Did you mean 'dls'?"),  # before dls is played
     ],
 )
