@@ -119,8 +119,8 @@ def sns_step(model, numbers, seen, memory, answer):
 class SaturationInNullSpace(ResolvedRate):
     """The smallest joint velocity that makes the task velocity; joints beyond their limits are set to them, one by one.
 
-    Each time the joint that would have to be slowed down the most is set to its bound, and its motion is subtracted
-    the task for the others: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
+    Each time the joint that would have to be slowed down the most is set to its bound, and the others make the rest
+    of the task: q̇ = q̇_N + (J W)⁺ (ẋ − J q̇_N). Where too few joints are left, the task velocity is scaled
     down instead, by the largest factor that was met on the way: the basic algorithm at velocity level (Flacco, De Luca
     and Khatib 2012, algorithm 1; 2015, section III), with the bounds of :func:`velocity_box`. It keeps the direction of
     the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
