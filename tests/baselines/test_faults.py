@@ -97,7 +97,7 @@ REFUSED = {
     "zhang3-helix": [
         ("follow_nominal", {}, "'zhang3-helix' is given in Cartesian space"),
         ("smoothed", {}, "stable below 2/Δt = 2, got 300"),
-        ("mfac", {"rule": "condition", "condition_bounds": (), "dampings": ()}, "expected 1 x 1 numbers, .* got 1 x 0"),
+        ("mfac", {"dampings": (), "condition_bounds": (), "rule": "condition"}, "expected 1 x 1 numbers, .* got 1 x 0"),
     ],
     "faitli3-regular": [
         ("fixed_point", {"components": (0, 1, 2)}, "expected none with transformation 'transpose'"),
