@@ -9,6 +9,8 @@ import ikgym
 from baselines.episodes import rollout
 from baselines.papers.zhang.episodes import PREDICTIVE
 from baselines.policy import Batch
+from baselines.solvers.levenberg_marquardt.block_tridiagonal import damped_horizon_step
+from baselines.solvers.levenberg_marquardt.damping import condition_number
 from baselines.status import Status
 
 RULES = {
@@ -223,6 +225,17 @@ def test_rank_that_is_lost_is_said_unless_it_is_damped(name):
         stretched = name, [0.0, 0.0, 18.0], (0.0, 0.0, 0.0)
         assert status_of(*stretched, **numbers)[0] == iterated
         assert status_of(*stretched, one_step=True, **numbers)[0] == one_step
+
+
+def test_rank_that_is_lost_amid_a_horizon_is_said():
+    """Block by block from its end: the last one can be factorised, the second cannot."""
+    rng = np.random.default_rng(0)
+    jacobians, out = rng.normal(size=(3, 3, 4)), np.empty((3, 4))
+    jacobians[1, 2] = jacobians[1, 0]
+    for damping, blocks in ((0.0, 1), (1e-18, 1), (1e-4, 3)):
+        scratch = np.empty((3, 3)), np.empty((3, 3, 3)), np.empty((3, 3))
+        assert damped_horizon_step(jacobians, rng.normal(size=(3, 3)), damping, scratch, out) == blocks
+    assert condition_number(np.zeros((3, 4)), 3, (np.empty((4, 3)), np.empty((3, 3)))) == np.inf
 
 
 def test_running_away_is_not_converging():
