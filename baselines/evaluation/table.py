@@ -117,7 +117,8 @@ def html(columns: Sequence[Column], lines: Sequence[Record]) -> str:
         ]
         for column in columns:
             value, text = line[column.name], escape(column.cell(line))
-            order = value if isinstance(value, (int, float)) and math.isfinite(value) else LAST
+            shown = text != NOTHING and isinstance(value, (int, float)) and math.isfinite(value)
+            order = value if shown else LAST
             out.append(
                 f"<td>{text}</td>" if isinstance(value, str) else f'<td class="number" data-order="{order}">{text}</td>'
             )

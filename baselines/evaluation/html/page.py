@@ -15,7 +15,7 @@ from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.results import Results
-from baselines.evaluation.summary import Record, by_scenario
+from baselines.evaluation.summary import RATIO, Record, by_scenario
 from baselines.evaluation.table import NOTHING, Column, html, number
 
 #: A placeholder in the template.
@@ -26,11 +26,11 @@ COLUMNS = (
     report.RATIO,
     Column(
         *("95 %", "", "low", "interval of the mean cost ratio over the episodes"),
-        text=lambda line: report.interval(line) if line["cost_ratio"] else NOTHING,
+        text=lambda line: report.interval(line) if line["quantity"] == RATIO else NOTHING,
     ),
     Column(
         *("worst", "", "worst", "largest cost ratio of an episode"),
-        text=lambda line: number(line["worst"] if line["cost_ratio"] else None),
+        text=lambda line: number(line["worst"] if line["quantity"] == RATIO else None),
     ),
     report.TOTAL,
     *report.ERRORS,

@@ -78,6 +78,18 @@ def test_the_interval_is_that_of_the_cost_ratio_over_the_episodes():
     assert "95 %" not in cells(summarise(rows[:1])[0])
 
 
+def test_total_costs_are_not_shown_as_ratios():
+    """A policy whose best known costs are all known, beside one with an episode of which none is."""
+    rows = [dataclasses.replace(BASE, seed=seed, cost_ratio=2.0) for seed in (0, 1)]
+    rows += [dataclasses.replace(BASE, policy="other", seed=seed, cost_ratio=None) for seed in (0, 5)]
+    first, second = summarise(rows)
+    assert cells(first)["cost ratio"] == ("2.0", "2.000")
+    assert not {"95 %", "worst"} & {*cells(first), *cells(second)}
+    known = [dataclasses.replace(row, scenario="known") for row in rows[:2]]
+    text = html(COLUMNS, [second, *summarise(known)])
+    assert text.count(f'data-order="{LAST}">–') >= 3  # the ratio, its interval and the worst
+
+
 def test_missing_numbers_are_dashes_and_sorted_last():
     lost = {"total_cost": math.nan, "position_error_max": math.inf}
     (entry,) = summarise([dataclasses.replace(BASE, **lost, time_p50_us=None, orientation_error_max=None)])
