@@ -60,7 +60,7 @@ def as_long(scenario: Scenario, episode: Episode) -> Scenario:
 def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> dict[str, float | None]:
     """The columns of a row that state how the path was followed, see :class:`baselines.evaluation.metrics.Row`.
 
-    None for a policy without free timing.
+    Empty for a policy without free timing.
     """
     if "progress" not in episode.diagnostics:
         return {}
