@@ -295,15 +295,20 @@ class Frozen:
 @functools.cache
 def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
     """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
-    hints, found = typing.get_type_hints(kind, include_extras=True), {}
-    for name in (field.name for field in dataclasses.fields(kind) if field.init):
+    hints: dict[str, Any] = {}
+    found: dict[str, tuple[Callable[[str, Any], Any], bool]] = {}
+    for base in reversed(kind.__mro__):
+        # Those of a user's class may name things that are known to type checkers alone.
+        with contextlib.suppress(NameError, AttributeError):
+            hints |= typing.get_type_hints(base, include_extras=True)
+    for name in (field.name for field in dataclasses.fields(kind) if field.init and field.name in hints):
         hint = hints[name]
         parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
         given = [part for part in parts if part is not type(None)]
         classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
         if len(classes) == len(given):
             found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)
-        for check in getattr(given[0], "__metadata__", ()):
+        for check in filter(callable, getattr(given[0], "__metadata__", ())):
             found[name] = check, len(given) < len(parts)
     return found
 

@@ -168,6 +168,16 @@ def test_copies_are_the_same_bit_for_bit_and_never_change(good):
         assert not any(one.flags.writeable for one in arrays if isinstance(one, np.ndarray))
 
 
+def test_a_class_of_ones_own_may_have_annotations_that_nobody_knows():
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Heavy(Sphere):
+        weight: "Kilograms | None" = None  # noqa: F821
+
+    assert Heavy("a", [0, 0, 0], 1, weight=3).radius == 1.0
+    with pytest.raises(IkgymError, match="radius"):
+        Heavy("a", [0, 0, 0], -1.0)
+
+
 def test_every_kind_of_part_is_in_the_table():
     kinds = {kind for family in (KINDS, PATHS, TIME_LAWS, ORIENTATIONS, OBSTACLES) for kind in family.values()}
     costs = {ikgym.TrackingCost, ikgym.ProximityCost}
