@@ -51,7 +51,7 @@ def float_array(
     """
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in "fiu":
+        if raw.dtype.kind not in "fiu" or _has_truth_values(value):
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -69,6 +69,13 @@ def float_array(
             f"{name}: expected numbers of at least {at_least:g}, got {array.ravel()[i]:g} as number {i}."
         )
     return array
+
+
+def _has_truth_values(value: object) -> bool:
+    """Whether a list has truth values, which NumPy takes for 0 and 1 among numbers."""
+    return isinstance(value, (bool, np.bool_)) or (
+        isinstance(value, (tuple, list)) and any(map(_has_truth_values, value))
+    )
 
 
 def frozen_array(
