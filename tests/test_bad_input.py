@@ -383,6 +383,8 @@ REFUSED = [
     ("num_envs", lambda: ikgym.sb3.RedundantIKVecEnv(0)),
     ("ahead: expected rising times", lambda: ikgym.rl.make(FAST, ahead=(0.05, 0.01))),
     ("no field of Task 'preview'", lambda: ikgym.rl.make(FAST, preview=1)),
+    ("expected an object of Task, got 'panda-random'", lambda: ikgym.rl.LearningEnv("panda-random")),
+    ("expected an object of Task, got 'panda-random'", lambda: ikgym.rl.LearningVectorEnv(2, "panda-random")),
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
     ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
