@@ -51,7 +51,7 @@ def float_array(
     """
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in "fiu" or _has_truth_values(value):
+        if raw.dtype.kind not in "fiu" or (raw is not value and _has_truth_values(value)):
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -63,7 +63,7 @@ def float_array(
         raise InvalidInputError(f"{name}: expected finite numbers, got {shortened(value)}.")
     if at_most < math.inf and (np.abs(array) > at_most).any():
         raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shortened(value)}.")
-    if (array < at_least).any():
+    if at_least > -math.inf and (array < at_least).any():
         i = int(np.argmax(array.ravel() < at_least))
         raise InvalidInputError(
             f"{name}: expected numbers of at least {at_least:g}, got {array.ravel()[i]:g} as number {i}."
