@@ -311,7 +311,7 @@ def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
     for name in (field.name for field in dataclasses.fields(kind) if field.init and field.name in hints):
         hint = hints[name]
         parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
-        given = [part for part in parts if part is not type(None)]
+        given = [part for part in parts if part is not type(None)] or [hint]
         classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
         if len(classes) == len(given):
             found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)

@@ -173,9 +173,15 @@ def test_a_class_of_ones_own_may_have_annotations_that_nobody_knows():
     class Heavy(Sphere):
         weight: "Kilograms | None" = None  # noqa: F821
 
-    assert Heavy("a", [0, 0, 0], 1, weight=3).radius == 1.0
-    with pytest.raises(IkgymError, match="radius"):
-        Heavy("a", [0, 0, 0], -1.0)
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Told(Sphere):
+        colour: typing.Annotated[float, "from 0 to 1"] = 0.5
+        nothing: None = None
+
+    for kind in (Heavy, Told):
+        assert kind("a", [0, 0, 0], 1).radius == 1.0
+        with pytest.raises(IkgymError, match="radius"):
+            kind("a", [0, 0, 0], -1.0)
 
 
 def test_every_kind_of_part_is_in_the_table():
