@@ -51,7 +51,7 @@ def float_array(
     """
     try:
         raw = np.asarray(value)
-        if raw.dtype.kind not in "fiu":
+        if raw.dtype.kind not in "fiu" or (raw is not value and _has_truth_values(value)):
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
@@ -63,12 +63,19 @@ def float_array(
         raise InvalidInputError(f"{name}: expected finite numbers, got {shortened(value)}.")
     if at_most < math.inf and (np.abs(array) > at_most).any():
         raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shortened(value)}.")
-    if (array < at_least).any():
+    if at_least > -math.inf and (array < at_least).any():
         i = int(np.argmax(array.ravel() < at_least))
         raise InvalidInputError(
             f"{name}: expected numbers of at least {at_least:g}, got {array.ravel()[i]:g} as number {i}."
         )
     return array
+
+
+def _has_truth_values(value: object) -> bool:
+    """Whether a list has truth values, which NumPy takes for 0 and 1 among numbers."""
+    return isinstance(value, (bool, np.bool_)) or (
+        isinstance(value, (tuple, list)) and any(map(_has_truth_values, value))
+    )
 
 
 def frozen_array(
@@ -295,15 +302,20 @@ class Frozen:
 @functools.cache
 def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
     """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
-    hints, found = typing.get_type_hints(kind, include_extras=True), {}
-    for name in (field.name for field in dataclasses.fields(kind) if field.init):
+    hints: dict[str, Any] = {}
+    found: dict[str, tuple[Callable[[str, Any], Any], bool]] = {}
+    for base in reversed(kind.__mro__):
+        # Those of a user's class may name things that are known to type checkers alone.
+        with contextlib.suppress(NameError, AttributeError):
+            hints |= typing.get_type_hints(base, include_extras=True)
+    for name in (field.name for field in dataclasses.fields(kind) if field.init and field.name in hints):
         hint = hints[name]
         parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
-        given = [part for part in parts if part is not type(None)]
+        given = [part for part in parts if part is not type(None)] or [hint]
         classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
         if len(classes) == len(given):
             found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)
-        for check in getattr(given[0], "__metadata__", ()):
+        for check in filter(callable, getattr(given[0], "__metadata__", ())):
             found[name] = check, len(given) < len(parts)
     return found
 

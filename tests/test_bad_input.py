@@ -168,6 +168,22 @@ def test_copies_are_the_same_bit_for_bit_and_never_change(good):
         assert not any(one.flags.writeable for one in arrays if isinstance(one, np.ndarray))
 
 
+def test_a_class_of_ones_own_may_have_annotations_that_nobody_knows():
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Heavy(Sphere):
+        weight: "Kilograms | None" = None  # noqa: F821
+
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Told(Sphere):
+        colour: typing.Annotated[float, "from 0 to 1"] = 0.5
+        nothing: None = None
+
+    for kind in (Heavy, Told):
+        assert kind("a", [0, 0, 0], 1).radius == 1.0
+        with pytest.raises(IkgymError, match="radius"):
+            kind("a", [0, 0, 0], -1.0)
+
+
 def test_every_kind_of_part_is_in_the_table():
     kinds = {kind for family in (KINDS, PATHS, TIME_LAWS, ORIENTATIONS, OBSTACLES) for kind in family.values()}
     costs = {ikgym.TrackingCost, ikgym.ProximityCost}
@@ -373,6 +389,8 @@ REFUSED = [
     ("num_envs", lambda: ikgym.sb3.RedundantIKVecEnv(0)),
     ("ahead: expected rising times", lambda: ikgym.rl.make(FAST, ahead=(0.05, 0.01))),
     ("no field of Task 'preview'", lambda: ikgym.rl.make(FAST, preview=1)),
+    ("expected an object of Task, got 'panda-random'", lambda: ikgym.rl.LearningEnv("panda-random")),
+    ("expected an object of Task, got 'panda-random'", lambda: ikgym.rl.LearningVectorEnv(2, "panda-random")),
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
     ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (

@@ -12,11 +12,12 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from ikgym.env import RedundantIKEnv
+from ikgym.exceptions import InvalidInputError
 from ikgym.options import checked_mask
 from ikgym.rl.task import Task
 from ikgym.rl.track import Features, Learner
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray
+from ikgym.validation import BoolArray, FloatArray, shortened
 from ikgym.vector_env import RedundantIKVectorEnv
 
 FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
@@ -35,7 +36,7 @@ class LearningEnv(RedundantIKEnv):
     """
 
     def __init__(self, task: Task, render_mode: str | None = None) -> None:
-        super().__init__(**task.arguments(), render_mode=render_mode)
+        super().__init__(**_arguments(task), render_mode=render_mode)
         self.task = task
         self._learner = Learner(task, self.scenario, self.preview, self.observation_space)
         self.observation_space, self.action_space = self._learner.observation_space, self._learner.action_space
@@ -67,7 +68,7 @@ class LearningVectorEnv(RedundantIKVectorEnv):
     """
 
     def __init__(self, num_envs: int, task: Task, **options: Any) -> None:
-        super().__init__(num_envs, **task.arguments(), **options)
+        super().__init__(num_envs, **_arguments(task), **options)
         self.task, self._none = task, np.zeros(num_envs, dtype=np.bool_)
         self._learner = Learner(task, self.scenario, self.preview, self.single_observation_space, num_envs)
         self.single_observation_space = self._learner.observation_space
@@ -135,6 +136,14 @@ def make_vec(
     """
     task = Task(scenario).replace(**changes)
     return LearningVectorEnv(num_envs, task, autoreset_mode=autoreset_mode, render_mode=render_mode)
+
+
+def _arguments(task: Any) -> dict[str, Any]:
+    if not isinstance(task, Task):
+        raise InvalidInputError(
+            f"task: expected an object of Task, got {shortened(task)}; ikgym.rl.make and make_vec take a scenario."
+        )
+    return task.arguments()
 
 
 def _one_row(seen: dict[str, FloatArray]) -> dict[str, FloatArray]:

@@ -17,7 +17,7 @@ import pathlib
 from collections.abc import Callable
 
 from ikgym import problems
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.files import read_user_toml
 from ikgym.registry import Registry
 from ikgym.scenarios import files, published
@@ -171,7 +171,8 @@ def _imported(import_path: str) -> Scenario:
     except Exception as error:  # whatever the code of others raises
         fault = f"{type(error).__name__}: {error}"
         raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {fault}") from error
-    known_name(f"attribute of {name}", attribute, [key for key in vars(module) if key[0] != "_" or key == attribute])
+    if not hasattr(module, attribute):
+        raise UnknownNameError(f"attribute of {name}", attribute, [key for key in vars(module) if key[0] != "_"])
     found = getattr(module, attribute)
     return _registry.made(import_path, found if callable(found) else lambda: found)
 

@@ -321,6 +321,7 @@ BAD = [
     ({"dt": "2026-01-01"}, "dt: expected a finite number .* got datetime"),
     ({"velocity_limit": None}, "velocity_limit: expected a number, or one a joint"),
     ({"velocity_limit": "true"}, "velocity_limit: expected an array of real numbers, got True"),
+    ({"velocity_limit": "[true, 1, 1, 1]"}, "velocity_limit: expected an array of real numbers, got .True"),
     ({"arm": None}, "arm: expected the name of an arm or a table"),
     ({"arm": "3"}, "arm: expected the name of an arm or a table"),
     ({"arm": "'varga8'"}, "Did you mean 'varga7'"),
