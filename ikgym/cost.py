@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
 from ikgym.kernels.cost import CostParameters
-from ikgym.validation import FloatArray, Frozen, Positive, float_array, number
+from ikgym.validation import FloatArray, Positive, float_array, number
 
 #: The exponents of the cost do not exceed it.
 LARGEST_EXPONENT = 100.0

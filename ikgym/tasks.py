@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels import tasks as task_kernels
-from ikgym.validation import FloatArray, Frozen, ending, float_array, known_name
+from ikgym.validation import FloatArray, ending, float_array, known_name
 
 
 @dataclasses.dataclass(frozen=True)

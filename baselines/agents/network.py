@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import Frozen, known_name
+from ikgym.validation import known_name
 
 Singles = npt.NDArray[np.float32]
 

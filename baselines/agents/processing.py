@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from baselines.agents.network import Network
 from baselines.policy import Batch, Problem
-from ikgym.validation import FloatArray, Frozen, known_names
+from ikgym.frozen import Frozen
+from ikgym.validation import FloatArray, known_names
 
 
 class Held(NamedTuple):

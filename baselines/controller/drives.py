@@ -15,8 +15,9 @@ from baselines.policy import SolverPolicy
 from baselines.spec import PolicySpec, parse_policy
 from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import LARGEST, FloatArray, Frozen, number, shortened, whole_number
+from ikgym.validation import LARGEST, FloatArray, number, shortened, whole_number
 
 #: Drives that are to be identified.
 IDENTIFY = "identify"

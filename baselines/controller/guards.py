@@ -10,7 +10,8 @@ import numpy as np
 from baselines.controller import kernels
 from baselines.policy import Problem
 from ikgym.arms import Arm
-from ikgym.validation import FloatArray, Frozen, number, whole_number
+from ikgym.frozen import Frozen
+from ikgym.validation import FloatArray, number, whole_number
 
 
 class StopReason(enum.IntEnum):

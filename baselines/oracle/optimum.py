@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from baselines.oracle.best_known import MARGIN, MEANINGLESS, Record
-from ikgym.validation import FloatArray, Frozen, read_only, whole_number
+from ikgym.frozen import Frozen
+from ikgym.validation import FloatArray, read_only, whole_number
 
 #: Names of random starts, and of paths found by iterated local search.
 RANDOM, LOCAL_SEARCH = "random start", "local search"

@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
+from ikgym.frozen import Frozen
 from ikgym.kernels.bodies import Surroundings
 from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
-from ikgym.validation import FloatArray, Frozen, frozen_array
+from ikgym.validation import FloatArray, frozen_array
 
 #: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
 Memory = tuple[npt.NDArray[Any], ...]

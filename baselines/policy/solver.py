@@ -32,11 +32,12 @@ from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.sharing import divided, undivided
 from baselines.policy_kernels import all_finite, cut_rows
+from ikgym.frozen import Frozen
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
-from ikgym.validation import FloatArray, Frozen
+from ikgym.validation import FloatArray
 
 #: Policies that have solved something in this process, and calls of kernels that have been made: they are compiled.
 compiled_classes: set[Any] = set()

@@ -16,9 +16,10 @@ import tyro
 from baselines.agents.bilinear.processing import Bilinear
 from ikgym import rl, scenarios, tasks
 from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels.tasks import SKEW
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, known_names, number, whole_number
+from ikgym.validation import known_names, number, whole_number
 
 Activation = Literal["silu", "relu", "tanh", "elu"]
 

@@ -14,13 +14,13 @@ from ikgym.arms import checks
 from ikgym.arms.bodies import Bodies, Neighbour
 from ikgym.arms.source import UrdfReference
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels import kinematics
 from ikgym.kernels.bodies import clearance_rows
 from ikgym.kernels.kinematics import Chain
 from ikgym.validation import (
     LARGEST,
     FloatArray,
-    Frozen,
     Rotation,
     Vector,
     about,

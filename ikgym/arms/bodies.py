@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels.bodies import OBSTACLE, Shapes, Surroundings
 from ikgym.validation import (
     LARGEST,
     SMALLEST,
     FloatArray,
-    Frozen,
     IntArray,
     different_texts,
     float_array,

@@ -11,12 +11,12 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.trajectories import Trajectory
 from ikgym.validation import (
     IDENTITY,
     Direction,
     FloatArray,
-    Frozen,
     Positive,
     Rotation,
     Sizes,

@@ -12,11 +12,12 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels.random_numbers import CUT
 from ikgym.plant import checks, severity
 from ikgym.plant.arm_kernels import Numbers
 from ikgym.plant.checks import Drawn, PerJoint
-from ikgym.validation import LARGEST, FloatArray, Frozen, number, per_joint, shortened, whole_number
+from ikgym.validation import LARGEST, FloatArray, number, per_joint, shortened, whole_number
 
 #: Fields with one number for all joints, or one a joint; and those of them that may be negative.
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise")

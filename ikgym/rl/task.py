@@ -10,8 +10,9 @@ import numpy as np
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import Frozen, flag, float_array, number, shortened, whole_number
+from ikgym.validation import flag, float_array, number, shortened, whole_number
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,6 +15,7 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.obstacles import Obstacle
 from ikgym.plant import DrawnPlant, Plant
@@ -23,7 +24,7 @@ from ikgym.scenarios import checks, durations, files, starts
 from ikgym.scenarios.surroundings import Surrounded
 from ikgym.tasks import Task
 from ikgym.trajectories import Trajectory, first_joints_of
-from ikgym.validation import LARGEST, FloatArray, Frozen, Positive, about, frozen_array, shortened
+from ikgym.validation import LARGEST, FloatArray, Positive, about, frozen_array, shortened
 
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi

@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.trajectories.paths import Path
 from ikgym.trajectories.splines import CubicSpline
-from ikgym.validation import LARGEST, Direction, FloatArray, Frozen, Rotation, Vector, float_array, read_only
+from ikgym.validation import LARGEST, Direction, FloatArray, Rotation, Vector, float_array, read_only
 
 # Quaternions of files are rounded: so far may their length be from 1.
 QUATERNION_TOLERANCE = 1e-5

@@ -9,8 +9,9 @@ import math
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.trajectories.paths import Path
-from ikgym.validation import FloatArray, Frozen, Positive
+from ikgym.validation import FloatArray, Positive
 
 
 @dataclasses.dataclass(frozen=True)

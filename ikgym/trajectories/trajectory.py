@@ -9,7 +9,8 @@ import numpy as np
 
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, Frozen
+from ikgym.frozen import Frozen
+from ikgym.validation import FloatArray
 
 
 class Trajectory(Frozen):

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import LARGEST, FloatArray, Frozen, frozen_array
+from ikgym.frozen import Frozen
+from ikgym.validation import LARGEST, FloatArray, frozen_array
 
 
 class Path(Frozen, abc.ABC):
