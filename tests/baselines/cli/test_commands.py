@@ -66,7 +66,7 @@ def test_help_of_each_command(word, capsys):
         ),
         (["train", "--out", "x"], "There is no method '--out'. Available: apg, ppo, sac, td3, recurrent_ppo."),
         (["train", "ppo", "--env", "ikgym/Track-v0"], "Missing from ikgym train ppo: --out."),
-        (["train", "ppo", "--out", "x"], "Missing from ikgym train ppo: --env. See ikgym train --help."),
+        (["train", "ppo", "--out", "x"], "ppo needs an environment: expected --env, one of ikgym/Reach-v0"),
         (["arms", "--name", "varga7"], "See ikgym arms --help."),
         (["arms", "none.urdf"], "Cannot read none.urdf"),
         (["arms", "mine.toml"], "Cannot read mine.toml"),
