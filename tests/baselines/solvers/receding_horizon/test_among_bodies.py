@@ -58,7 +58,7 @@ def test_a_ball_in_the_way_is_not_touched(name, parameters):
 @pytest.mark.slow
 def test_drawn_boxes_are_kept_clear_of():
     """Episode 10 of 1,000 steps, in which what looks at no bodies goes 14 mm into one."""
-    boxes = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.05] * 3, [0.25] * 3, 10, 0.02, 0.1)
+    boxes = RandomBoxes("box", [-0.7, -0.7, 0.0], [0.8, 0.7, 1.1], [0.05] * 3, [0.25] * 3, 0.02, 0.1, count=10)
     scenario = ikgym.scenarios.get("panda-random").replace(steps=1000, obstacles=[boxes])
     free = scenario.replace(obstacles=[])
     (touching,) = rollouts(free, baselines.make("rhc_foresight", free), (10,))
