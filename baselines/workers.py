@@ -17,7 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from ikgym import parallel
+from ikgym import machine
 from ikgym.exceptions import IkgymError, MissingDependencyError
 from ikgym.validation import known_name, whole_number
 
@@ -212,7 +212,7 @@ def _tasks() -> Iterator[Call]:
 
 def _on_one_core(function: Callable[[Any], Any], unit: Any) -> tuple[Any, Exception | None]:
     """Result and error of a unit: Ray replaces exceptions by its own."""
-    parallel.limit(1)
+    machine.limit(1)
     try:
         return function(unit), None
     except Exception as e:

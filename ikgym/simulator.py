@@ -15,9 +15,8 @@ from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
-from ikgym.memory import check_memory, of_rows
+from ikgym.machine import check_memory, in_chunks, of_rows
 from ikgym.options import take_actions
-from ikgym.parallel import in_chunks
 from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.scenarios import Scenario

@@ -22,7 +22,7 @@ from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits
-from ikgym.parallel import cores
+from ikgym.machine import cores
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 

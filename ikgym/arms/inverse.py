@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import parallel
+from ikgym import machine
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
@@ -61,7 +61,7 @@ def inverse(
 
     # A look takes less time than a timer that is never needed.
     with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
-        parallel.in_chunks(work, len(q), GRAIN)
+        machine.in_chunks(work, len(q), GRAIN)
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
 
 

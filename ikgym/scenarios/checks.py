@@ -10,7 +10,7 @@ import numpy as np
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.memory import check_memory, gib
+from ikgym.machine import check_memory, gib
 from ikgym.obstacles import Obstacle
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, flag, known_names, shortened, whole_number

@@ -28,7 +28,7 @@ from baselines.registry import get
 from baselines.solvers.references.follow_nominal import PrivilegedPath
 from baselines.status import Status
 from baselines.wrapper import Wrapper
-from ikgym import parallel
+from ikgym import machine
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.plant import DrawnPlant
@@ -128,7 +128,7 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name):
         return solve(self, batch, memory)
 
     monkeypatch.setattr(type(policy), "solve", watched)
-    monkeypatch.setattr(parallel, "cores", lambda: 2)
+    monkeypatch.setattr(machine, "cores", lambda: 2)
     whole, shared = None, None
     for k, observation in enumerate(itertools.islice(observations(usual(name), policy.preview, 5), 3)):
         start = np.array([k == 0, k == 2, False, False, k == 1])

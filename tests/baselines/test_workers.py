@@ -11,7 +11,7 @@ import time
 import pytest
 
 from baselines.workers import Workers, finished
-from ikgym import parallel
+from ikgym import machine
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
 
 FAR = Workers(cluster="ray")
@@ -103,12 +103,12 @@ def test_without_ray_the_extra_is_named(monkeypatch):
 
 
 def test_fewer_cores(monkeypatch):
-    monkeypatch.setattr(parallel, "_limit", None)
-    everything = parallel.cores()
-    parallel.limit(1)
-    assert parallel.cores() == 1
-    parallel.limit(None)
-    assert parallel.cores() == everything
+    monkeypatch.setattr(machine, "_limit", None)
+    everything = machine.cores()
+    machine.limit(1)
+    assert machine.cores() == 1
+    machine.limit(None)
+    assert machine.cores() == everything
 
 
 @needs_proc

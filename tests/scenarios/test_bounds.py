@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym import memory, scenarios
+from ikgym import machine, scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Sinusoid
 from tests.every_scenario import every_scenario
@@ -70,7 +70,7 @@ def test_more_steps_than_any_memory_holds(field, steps):
 @pytest.fixture
 def little(monkeypatch):
     """A machine with 1 GiB."""
-    monkeypatch.setattr(memory, "available", lambda: memory.GIB)
+    monkeypatch.setattr(machine, "available", lambda: machine.GIB)
 
 
 NO_MEMORY = r"expected to fit into memory, but take about [\d,.]+ GiB, and 1\.0 GiB are available"
@@ -98,17 +98,17 @@ def test_many_environments_need_memory(make, number):
 
 def test_what_is_available_is_what_system_and_group_leave(tmp_path, monkeypatch):
     system, most, taken = (tmp_path / name for name in ("meminfo", "max", "current"))
-    monkeypatch.setattr(memory, "SYSTEM", system)
-    monkeypatch.setattr(memory, "GROUP", (most, taken))
+    monkeypatch.setattr(machine, "SYSTEM", system)
+    monkeypatch.setattr(machine, "GROUP", (most, taken))
     system.write_text("MemTotal: 9000 kB\nMemAvailable:    4000 kB\n")
-    assert memory.available() == 4000 * 1024
+    assert machine.available() == 4000 * 1024
     most.write_text("3000000\n")
     taken.write_text("1000000\n")
-    assert memory.available() == 2_000_000
+    assert machine.available() == 2_000_000
     most.write_text("max\n")
-    assert memory.available() == 4000 * 1024
+    assert machine.available() == 4000 * 1024
     system.unlink()
-    assert memory.available() is None or memory.available() > 0
+    assert machine.available() is None or machine.available() > 0
 
 
 def test_rewards_that_stable_baselines3_cannot_hold():

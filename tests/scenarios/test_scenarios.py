@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym import parallel, scenarios
+from ikgym import machine, scenarios
 from ikgym.exceptions import IkgymError, UnknownNameError
 from ikgym.plant import Plant
 from tests.every_scenario import every_scenario
@@ -76,14 +76,14 @@ def test_disturbance_moves_the_arm_as_said():
 
 
 def test_chunks_cover_all_rows_once(monkeypatch):
-    monkeypatch.setattr(parallel, "cores", lambda: 4)
+    monkeypatch.setattr(machine, "cores", lambda: 4)
     for rows in (0, 1, 7, 100, 1001):
         seen = np.zeros(rows, dtype=int)
 
         def work(start, stop, seen=seen):
             seen[start:stop] += 1
 
-        parallel.in_chunks(work, rows, grain=10)
+        machine.in_chunks(work, rows, grain=10)
         assert (seen == 1).all()
 
 
