@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -11,27 +12,28 @@ import numpy.typing as npt
 from baselines.controller import kernels
 from baselines.controller.drives import IDENTIFY, LONGEST, Drives, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
-from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers
+from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers, obstacle_rows
 from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import remembered
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.spec import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
-from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.tasks import pose_rows
+from ikgym.obstacles import Obstacle
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import furthest, offsets
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, shortened, whole_number
 
 logger = logging.getLogger("ikgym")
 
 #: Steps left where no end of the episode is given.
 ENDLESS = 1_000_000
 _DIVERGED = int(Status.DIVERGED)
-#: Calls that :meth:`Controller.warm_up` times.
-WARM_UP = 500
+#: Calls that :meth:`Controller.warm_up` times, and the largest number of them.
+WARM_UP, MOST_CALLS = 500, 10_000_000
 
 
 class Controller:
@@ -47,9 +49,11 @@ class Controller:
     is stable up to 25 periods of delay and is the price: an error halves in 11 periods, where a policy on perfect
     drives takes it back in one. With perfect drives, ``Drives()``, the policy acts on the measurements themselves.
 
-    *Limits.* Commands stay within the velocities and accelerations of the model, and end at its stops, as in the
-    environment. With imperfect drives they are at most 1.25 times as fast as the policy wanted to be within the last
-    second, and joints without a limit of acceleration have that of :attr:`Guards.stopping_time`.
+    *Limits.* Commands stay within the velocities and accelerations of the model. A joint brakes ahead of its stop, and
+    one beyond its stop is led back; the acceleration limit takes precedence over the stop, see
+    :func:`baselines.solvers.quadratic_program.velocity_box.velocity_box`. With imperfect drives commands are at most
+    1.25 times as fast as the policy wanted to be within the last second, and joints without a limit of acceleration
+    have that of :attr:`Guards.stopping_time`.
 
     *Guards.* Implausible measurements end in a controlled stop, which lasts until :meth:`reset`, see :class:`Guards`
     and :attr:`stopped`. Joint coordinates must not jump by 2π: unwrap them. Only arrays of a wrong shape raise an
@@ -65,7 +69,7 @@ class Controller:
 
     Raises:
         InvalidInputError: The policy is none, does not suit the scenario, or has privileged information on an episode
-            that is not said to end; or the drives are none.
+            that is not said to end; or the drives or the guards are none.
         UnknownNameError: There is no such scenario or policy, or parameter of it.
     """
 
@@ -78,6 +82,8 @@ class Controller:
         guards: Guards | None = None,
         steps: int | None = None,
     ) -> None:
+        if guards is not None and not isinstance(guards, Guards):
+            raise InvalidInputError(f"guards: expected Guards(…) or None, got {shortened(guards)}.")
         self._scenario, self._guards = scenarios.find(scenario), Guards() if guards is None else guards
         self.policy = policy_for(self._scenario, policy, drives, self._guards)
         if self.policy.reference and steps is None:
@@ -85,7 +91,7 @@ class Controller:
         self._steps = None if steps is None else whole_number("steps", steps, at_least=1)
         self._given = drives if isinstance(drives, Drives) else None
         problem = self._problem = self.policy.problem
-        self._limits = limit_rows(problem.model, problem.largest_qdot, problem.dt)
+        self._limits = limits_with_braking(problem)
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         delay = LONGEST if self._given is None else self._given.delay
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
@@ -108,8 +114,9 @@ class Controller:
         reference: Pose,
         *,
         qdot: npt.ArrayLike | None = None,
-        q_age: float = 0,
-        pose_age: float = 0,
+        q_age: float = 0.0,
+        pose_age: float = 0.0,
+        obstacles: npt.ArrayLike | Sequence[Obstacle] | None = None,
     ) -> FloatArray:
         """The joint velocities for the next control period.
 
@@ -122,25 +129,32 @@ class Controller:
             qdot: Measured joint velocities in [rad/s] or [m/s]; the last command if left out. Shape (n,).
             q_age: Control periods since q was measured.
             pose_age: The same of the pose.
+            obstacles: The obstacles as they will be at the end of this period, in the order of the scenario's, where
+                those move or are drawn: :mod:`ikgym.obstacles`, or rows as in the observation of the environment, of
+                shape (o, 16).
 
         Returns:
             Joint velocities in [rad/s] or [m/s], within the limits. Shape (n,).
 
         Raises:
-            InvalidInputError: Something has a wrong shape, or the reference is too short.
+            InvalidInputError: Something has a wrong shape, the reference is too short, or obstacles are missing.
         """
         measured = numbers("q", q, (self._joints,))
         speed = self._last.copy() if qdot is None else self._speed(qdot)
         seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
+        ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)
         if self._stopped is None:
-            ages = float(q_age), float(pose_age)
             reason = kernels.watch(
                 *(measured, speed, seen, ahead, *ages),
                 *(self._kind, self._bounds, self._numbers, self._kept, self._counters),
             )
+            if solids is not None and not np.isfinite(solids).all():
+                reason = kernels.NOT_FINITE
+            if self._made == 0 and reason != kernels.NOT_FINITE:
+                self._last[:] = speed  # an arm in motion is taken over
             if reason == 0:
-                return self._commanded(measured, speed, seen, nominal, ages)
+                return self._commanded(measured, speed, seen, nominal, ages, solids)
             self._stopped = StopReason(reason)
         return self._braked()
 
@@ -151,8 +165,11 @@ class Controller:
 
         Args:
             calls: How many calls are timed.
+
+        Raises:
+            InvalidInputError: The policy fails, or a guard stops the arm at the start of the reference.
         """
-        calls = whole_number("calls", calls, at_least=1)
+        calls = whole_number("calls", calls, at_least=1, at_most=MOST_CALLS)
         self.reset()
         spent = self._play(calls)
         self.reset()
@@ -187,12 +204,20 @@ class Controller:
         return self.policy.report(self._state)
 
     def _speed(self, qdot: npt.ArrayLike) -> FloatArray:
-        """Measured joint velocities, cut to the largest ones; the first command starts from the first of them."""
+        """Measured joint velocities, cut to the largest ones. Shape (n,)."""
         fastest = self._problem.largest_qdot
         speed: FloatArray = np.clip(numbers("qdot", qdot, (self._joints,)), -fastest, fastest)
-        if self._made == 0 and np.isfinite(speed).all():
-            self._last[:] = speed
         return speed
+
+    def _obstacles(self, obstacles: npt.ArrayLike | Sequence[Obstacle] | None) -> FloatArray | None:
+        """Rows of the obstacles, where the policy is shown any. Shape (o, 16)."""
+        problem = self._problem
+        count = len(problem.surroundings.boxes) if problem.surroundings and problem.obstacles_shown else 0
+        if count:
+            return obstacle_rows(obstacles, count)
+        if obstacles is not None:
+            raise InvalidInputError("obstacles: expected none, since no obstacle of the scenario moves or is drawn.")
+        return None
 
     def _seen(self, pose: Pose | None, q: FloatArray) -> FloatArray:
         """Task coordinates of the measured pose, or of the model's at q. Shape (m,)."""
@@ -212,12 +237,20 @@ class Controller:
         return nominal[:preview] if isinstance(preview, int) else nominal[np.array(preview) - 1]
 
     def _commanded(
-        self, q: FloatArray, qdot: FloatArray, pose: FloatArray, nominal: FloatArray, ages: tuple[float, float]
+        self,
+        q: FloatArray,
+        qdot: FloatArray,
+        pose: FloatArray,
+        nominal: FloatArray,
+        ages: tuple[float, float],
+        obstacles: FloatArray | None,
     ) -> FloatArray:
         """The policy's command within the limits, or that of a stop where it fails. Shape (n,)."""
         left = ENDLESS if self._steps is None else max(self._steps - self._made, 0)
         parts = q[None], qdot[None], pose[None], nominal[None], np.array([[float(left)]])
         batch = Batch(*parts, *np.array(ages).reshape(2, 1, 1)) if ages != (0.0, 0.0) else Batch(*parts)
+        if obstacles is not None:
+            batch = batch._replace(obstacles=obstacles[None])
         try:
             memory = self.policy.memory(1) if self._state is None else remembered(self._state)
             action, self._state = self.policy.act(batch, memory)
@@ -243,12 +276,21 @@ class Controller:
         """Durations in [s] of calls along the scenario's reference, on a perfect arm; one more compiles."""
         scenario, ahead, spent = self._scenario, self.ahead, []
         nominal, start = scenario.nominal(0, ahead), scenario.first_q(scenario.episode(0))
+        around = scenario.replace(obstacles=scenario.obstacles_of(0)).obstacle_rows(scenario.steps + 1)
         self._touch()
         q, k = start, 0
-        for _ in range(calls + 1):
+        while len(spent) <= calls:
+            shown = around[min(k + 1, len(around) - 1)] if self._problem.obstacles_shown else None
             begin = time.perf_counter()
-            qdot = self.step(q, None, nominal[k + 1 : k + 1 + ahead])
-            spent.append(time.perf_counter() - begin)
+            qdot = self.step(q, None, nominal[k + 1 : k + 1 + ahead], obstacles=shown)
+            duration = time.perf_counter() - begin
+            if self._stopped is None:
+                spent.append(duration)
+            elif k == 0 or self._stopped is StopReason.POLICY:
+                raise InvalidInputError(
+                    f"warm_up: expected a policy that follows the reference of scenario {scenario.name!r} within the "
+                    f"guards, but {self.policy.name} is stopped in period {k + 1}: {self._stopped.label}."
+                )
             q, k = q + scenario.dt * qdot, k + 1
             if k == scenario.steps or self._stopped is not None:
                 self.reset()
@@ -259,3 +301,8 @@ class Controller:
         """Compiles kernels that the first periods may not call: poses as rotation and position, and a stop."""
         self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
         self._braked()
+
+
+def _age(name: str, age: float) -> float:
+    """The age of a measurement in control periods; one that is not finite, or below 0, is left to the guards."""
+    return age if type(age) is float else float(numbers(name, age, ()))

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from baselines.policy_kernels import all_finite
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym.kernels import tasks
 from ikgym.kernels.jit import kernel
-from ikgym.kernels.limits import applied
 
 # Reasons to stop, see :class:`baselines.controller.StopReason`; 0 for none.
 NOT_FINITE, STALE, JUMP, OUTSIDE, PATH_ERROR = range(1, 6)
@@ -87,10 +87,10 @@ def _errors(kind, nominal, pose):
 
 @kernel
 def command(limits, q, action, unit, last, dt, kept, out):
-    """The joint velocities that limits make of an action, as in a step of the environment.
+    """The joint velocities that limits make of an action.
 
     Args:
-        limits: See :func:`ikgym.kernels.limits.applied`; shape (0, n) where there are none.
+        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         action: Shape (n,).
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
@@ -99,13 +99,11 @@ def command(limits, q, action, unit, last, dt, kept, out):
         kept: See :func:`watch`, changed in place. Shape (2, n).
         out: Receives joint velocities in [rad/s] or [m/s]. Shape (n,).
     """
-    wanted = np.empty(q.shape[0])
-    for j in range(q.shape[0]):
-        wanted[j] = action[j] * unit[j]
-        out[j] = wanted[j]
-    if limits.shape[0] > 0:
-        applied(limits, q, wanted, last, dt, out)
-    for j in range(q.shape[0]):
+    n = q.shape[0]
+    lower, upper = np.empty(n), np.empty(n)
+    velocity_box(limits, dt, q, last, lower, upper)
+    for j in range(n):
+        out[j] = min(max(action[j] * unit[j], lower[j]), upper[j])
         last[j] = out[j]
         kept[TRAVEL, j] += dt * out[j]
 

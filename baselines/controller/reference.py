@@ -1,7 +1,8 @@
-"""Poses that a control loop is given, as task coordinates."""
+"""Poses and obstacles that a control loop is given, as arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy.typing as npt
 from baselines.controller.kernels import convert
 from baselines.policy.arguments import as_floats
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.outcome import OBSTACLE
+from ikgym.obstacles import Obstacle
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, shortened
 
@@ -67,6 +70,23 @@ def coordinates_ahead(task: Task, reference: Any) -> FloatArray:
         return numbers("reference", reference, (None, task.size))
     rotations = numbers("reference", reference[0], (None, 3, 3))
     return _converted(task, rotations, numbers("reference", reference[1], (len(rotations), 3)))
+
+
+def obstacle_rows(obstacles: npt.ArrayLike | Sequence[Obstacle] | None, count: int) -> FloatArray:
+    """Rows of obstacles that are given as such, or as rows. Shape (count, 16).
+
+    Raises:
+        InvalidInputError: There are none, or another number of them.
+    """
+    if obstacles is None:
+        raise InvalidInputError(
+            f"obstacles: expected {count}, since those of the scenario move or are drawn, got None."
+        )
+    if isinstance(obstacles, (list, tuple)) and all(isinstance(one, Obstacle) for one in obstacles):
+        obstacles = np.concatenate(
+            [np.empty((0, OBSTACLE)), *(one.numbers().reshape(-1, OBSTACLE) for one in obstacles)]
+        )
+    return numbers("obstacles", obstacles, (count, OBSTACLE))
 
 
 def _converted(task: Task, rotations: FloatArray, positions: FloatArray) -> FloatArray:

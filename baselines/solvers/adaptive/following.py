@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.solvers.adaptive.drives import mixture
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym.kernels.jit import kernel
-from ikgym.kernels.limits import applied
 from ikgym.validation import FloatArray
 
 #: Share of the largest acceleration that corrects an error.
@@ -45,20 +45,19 @@ def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
 
     Args:
-        limits: See :func:`ikgym.kernels.limits.applied`; shape (0, n) where there are none.
+        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
         wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
         q: Joint coordinates in [rad] or [m], changed in place. Shape (B, n).
         qdot: The velocities applied last, in [rad/s] or [m/s], changed in place. Shape (B, n).
     """
-    out = np.empty(q.shape[1])
+    n = q.shape[1]
+    lower, upper = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
-        out[:] = wanted[row]
-        if limits.shape[0] > 0:
-            applied(limits, q[row], wanted[row], qdot[row], dt, out)
-        for j in range(q.shape[1]):
-            q[row, j] += dt * out[j]
-            qdot[row, j] = out[j]
+        velocity_box(limits, dt, q[row], qdot[row], lower, upper)
+        for j in range(n):
+            qdot[row, j] = min(max(wanted[row, j], lower[j]), upper[j])
+            q[row, j] += dt * qdot[row, j]
 
 
 @kernel

@@ -22,8 +22,8 @@ from baselines.solvers.adaptive.drives import (
     start_memory,
 )
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
+from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.wrapper import NamedWrapper
-from ikgym.arms.limits import limit_rows
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import furthest, offsets
 from ikgym.validation import FloatArray, flag, number, whole_number
@@ -157,13 +157,13 @@ class Predicted(NamedWrapper):
 
     @functools.cached_property
     def _limits(self) -> tuple[FloatArray, tuple[object, ...]]:
-        """The limits of the arm, see :func:`limit_rows`, and a plain :class:`Servo`."""
+        """The limits of the arm, see :func:`limits_with_braking`, and a plain :class:`Servo`."""
         problem, model = self.problem, self.problem.model
         change = np.array(model.acceleration_limit * problem.dt)
         overdrive = math.inf if self.overdrive is None else self.overdrive
         unit, largest = np.array(problem.velocity_limit), np.array(problem.largest_qdot)
         servo = Servo(self.gain, problem.dt, unit, largest, change, overdrive)
-        return limit_rows(model, self.inner.problem.largest_qdot, problem.dt), tuple(servo)
+        return limits_with_braking(self.inner.problem), tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
         """Takes in the measurements, and tells how far the arm is from where the drives should have brought it."""
@@ -187,9 +187,9 @@ class Predicted(NamedWrapper):
         else:
             nominal = batch.nominal[np.arange(rows)[:, None], delay[:, None] + np.array(offsets(preview)) - 1]
         remaining = np.maximum(batch.remaining - delay[:, None], 1.0)
-        return Batch(
-            kept.arm_q.copy(), kept.arm_qdot.copy(), self.problem.poses(kept.arm_q) + kept.offset, nominal, remaining
-        )
+        pose = self.problem.poses(kept.arm_q) + kept.offset
+        parts = kept.arm_q.copy(), kept.arm_qdot.copy(), pose, nominal, remaining
+        return Batch(*parts, obstacles=batch.obstacles)
 
     def _past(self, steps: npt.NDArray[np.int64], kept: PredictedMemory) -> FloatArray:
         """Predicted joint coordinates of the arms, see :func:`past_rows`."""

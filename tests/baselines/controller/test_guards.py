@@ -155,3 +155,38 @@ def test_a_measured_velocity_beyond_the_limits_is_no_reason_to_go_on_with_it(sce
     for _ in range(3):
         loop.step(qdot=np.full(7, 1e9))
         assert (np.abs(loop.qdot) <= scenario.arm.velocity_limit).all()
+
+
+@pytest.mark.parametrize("first", [None, 2.0])
+@pytest.mark.parametrize(
+    "fault", [{"q": NAN}, {"q_age": -1.0}, {"pose": np.full(12, np.nan)}, {"q": np.full(7, 9.0)}, {"pose_age": np.inf}]
+)
+def test_a_stop_in_the_first_period_ends_at_rest_whatever_is_measured(scenario, first, fault):
+    loop = Loop(scenario)
+    seen = {"qdot": None if first is None else np.full(7, first), **fault}
+    assert loop.step(**seen) is not None
+    last = loop.qdot
+    trusted = first is not None and all(np.isfinite(value).all() for value in fault.values())
+    assert last.any() == trusted
+    for k in range(100):
+        loop.step(**{"qdot": np.full(7, 2.0 * (-1.0) ** k) if k % 3 else NAN, **fault})
+        assert (np.abs(loop.qdot) <= np.abs(last)).all()
+        assert (loop.qdot * last >= 0.0).all()
+        last = loop.qdot
+    assert not last.any()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda scenario: Controller(scenario, guards=True), "guards: expected Guards.…. or None, got True"),
+        (lambda scenario: Loop(scenario).step(q_age=None), "q_age: expected an array of real numbers, got None"),
+        (lambda scenario: Loop(scenario).step(pose_age="1"), "pose_age: expected an array of real numbers, got '1'"),
+        (lambda scenario: Loop(scenario).step(obstacles=[]), "obstacles: expected none"),
+        (lambda scenario: Loop(scenario).controller.warm_up(10**400), "calls: expected a whole number from 1 to"),
+    ],
+)
+def test_hostile_input(scenario, call, message):
+    with pytest.raises(InvalidInputError, match=message) as error:
+        call(scenario)
+    assert "\n" not in str(error.value)

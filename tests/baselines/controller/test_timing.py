@@ -8,8 +8,9 @@ import warnings
 import numpy as np
 import pytest
 
-from baselines import Controller, Drives
+from baselines import Controller, Drives, Guards
 from baselines.solvers.quadratic_program.qp import QuadraticProgram
+from ikgym.exceptions import InvalidInputError
 from tests.baselines.controller.circles import circle
 
 
@@ -44,4 +45,19 @@ def test_a_period_that_is_not_kept_is_warned_of(monkeypatch):
         assert Controller(scenario, drives=Drives()).warm_up(5).p50 > 6e-3
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        Controller(scenario.replace(dt=1.0), drives=Drives()).warm_up(5)
+        Controller(scenario.replace(dt=0.1), drives=Drives()).warm_up(5)
+
+
+def test_calls_that_fail_are_not_timed(monkeypatch):
+    """Nor those of a stop: where the reference cannot be followed from its start there is nothing to time."""
+    scenario = circle("panda", 4e-3)
+    with pytest.raises(InvalidInputError, match="guards, but qp is stopped in period 1: path_error"):
+        Controller("varga7-fast", drives=Drives()).warm_up(3)
+    assert Controller("varga7-fast", drives=Drives(), guards=Guards(position_error=None)).warm_up(3).p50 > 0.0
+
+    def failing(policy, batch, memory):
+        raise np.linalg.LinAlgError("singular")
+
+    monkeypatch.setattr(QuadraticProgram, "act", failing)
+    with pytest.raises(InvalidInputError, match="qp is stopped in period 1: policy"):
+        Controller(scenario, drives=Drives()).warm_up(3)
