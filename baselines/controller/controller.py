@@ -274,7 +274,8 @@ class Controller:
 
     def _play(self, calls: int) -> list[float]:
         """Durations in [s] of calls along the scenario's reference, on a perfect arm; one more compiles."""
-        scenario, ahead, spent = self._scenario, self.ahead, []
+        scenario, ahead = self._scenario, self.ahead
+        spent: list[float] = []
         nominal, start = scenario.nominal(0, ahead), scenario.first_q(scenario.episode(0))
         around = scenario.replace(obstacles=scenario.obstacles_of(0)).obstacle_rows(scenario.steps + 1)
         self._touch()
