@@ -33,7 +33,7 @@ class UnknownNameError(IkgymError, LookupError):
 
     def __init__(self, kind: str, name: object, available: Iterable[str]) -> None:
         self.kind, self.name, self.available = kind, name, tuple(available)
-        near = difflib.get_close_matches(name, self.available, n=1, cutoff=0.5) if isinstance(name, str) else ()
+        near = _nearest(name, self.available) if isinstance(name, str) else ()
         hint = f" Did you mean {near[0]!r}?" if near else ""
         listing = listed(self.available) or "none"
         shown = " ".join(repr(name).split())  # arrays take several lines
@@ -42,6 +42,14 @@ class UnknownNameError(IkgymError, LookupError):
 
     def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, object, tuple[str, ...]]]:
         return type(self), (self.kind, self.name, self.available)
+
+
+def _nearest(name: str, available: Sequence[str]) -> Sequence[str]:
+    """The name that is nearest, capital letters aside where none is near with them; empty if none is near."""
+    small = {other.lower(): other for other in available}
+    return difflib.get_close_matches(name, available, n=1, cutoff=0.5) or [
+        small[other] for other in difflib.get_close_matches(name.lower(), small, n=1, cutoff=0.5)
+    ]
 
 
 class UnexpectedArgumentError(IkgymError, TypeError):

@@ -14,7 +14,7 @@ class UrdfReference(NamedTuple):
     Attributes:
         file: The file, as an absolute path.
         base: The link at its beginning, None for the root.
-        tip: The link at its end, None for the only leaf.
+        tip: The link at its end, None for the only one that it can be.
         tool: Tool point in the frame of the tip in [m], None for its origin. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, None for that frame's. Shape (3, 3).
         meshes: Whether collision meshes were opened.

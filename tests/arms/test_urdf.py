@@ -110,6 +110,87 @@ def test_the_only_leaf_below_the_base_that_moves_is_the_tip(write):
         from_urdf(path)
 
 
+@pytest.mark.parametrize(
+    ("quaternion", "rpy"),
+    [
+        ("0 0 0 1", (0, 0, 0)),
+        ("0 0.7071067811865476 0 0.7071067811865476", (0, np.pi / 2, 0)),
+        ("0 -0.7071067811865476 0 0.7071067811865476", (0, -np.pi / 2, 0)),
+        ("-0.2 0.5 -0.4 0.7416198487095663", None),
+        ("0.8 0 0.6 0", None),
+    ],
+)
+def test_a_rotation_may_be_a_quaternion(write, quaternion, rpy):
+    """That of URDF 1.1, which counted as no rotation."""
+    inside = f'<origin xyz="0.1 0.2 0.3" quat_xyzw="{quaternion}"/>{LIMIT}'
+    rotation, position = from_urdf(write(with_joint(inside=inside))).forward([0.0])
+    expected = pin.Quaternion(np.array(quaternion.split(), dtype=float)).toRotationMatrix()
+    np.testing.assert_allclose(rotation, expected, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(position, [0.1, 0.2, 0.3])
+    if rpy is not None:
+        np.testing.assert_allclose(rotation, pin.rpy.rpyToMatrix(*rpy), rtol=0, atol=1e-15)
+
+
+ENDLESS = '<limit lower="-1e16" upper="1e16" velocity="3" vendor:acceleration="3" effort="1"/>'
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside", "line"),
+    [
+        ("revolute", '<axis xyz="0 0 2"/>' + LIMIT, "axis (0.0, 0.0, 2.0) was scaled to unit length"),
+        ("revolute", '<axis xyz="0.71 0.71 0"/>' + LIMIT, ""),
+        ("revolute", LIMIT.replace('"3"', '"180"'), "degrees? Its velocity limit is 180 rad/s"),
+        ("prismatic", LIMIT.replace('"3"', '"180"'), ""),
+        ("continuous", "", "continuous and has no velocity limit"),
+        ("continuous", '<limit velocity="3" acceleration="1" jerk="1"/>', ""),
+        ("revolute", ENDLESS, ""),
+    ],
+)
+def test_what_is_unusual_is_said(write, kind, inside, line, caplog):
+    arm = from_urdf(write(with_joint(kind, inside)))
+    assert np.linalg.norm(arm.axes) == pytest.approx(1.0, abs=1e-15)
+    assert [record.getMessage().startswith("arm.urdf: joint 'j1': ") for record in caplog.records] == [True] * bool(
+        line
+    )
+    assert line in caplog.text
+
+
+HAND = (joint("j1", "base", "arm"), joint("j2", "arm", "panda_hand", "fixed"))
+FINGERS = (joint("finger_joint1", "panda_hand", "left", "prismatic"), joint("f2", "panda_hand", "right", "prismatic"))
+LINKS = ("base", "arm", "panda_hand", "left", "right")
+
+
+def test_the_only_tool_frame_is_the_tip_leaf_or_not(write):
+    path = write(robot(*HAND, *FINGERS, links=LINKS))
+    assert [tip.link for tip in arms.tips(path)] == ["panda_hand", "right", "left"]
+    assert from_urdf(path).joint_names == ("j1",)
+    # A tool frame below another one is nearer to the tool.
+    tcp = '<link name="hand_tcp"/>' + joint("j3", "panda_hand", "hand_tcp", "fixed", '<origin xyz="0 0 0.1"/>')
+    path = write(robot(*HAND, *FINGERS, links=LINKS, extra=tcp))
+    np.testing.assert_array_equal(from_urdf(path).tool, [0, 0, 0.1])
+    # Two hands, however, are a choice.
+    two = '<link name="other_hand"/>' + joint("j3", "arm", "other_hand", "fixed", "")
+    with pytest.raises(InvalidInputError, match="several: 'other_hand', 'panda_hand', 'right', 'left'"):
+        from_urdf(write(robot(*HAND, *FINGERS, links=LINKS, extra=two)))
+
+
+def test_no_arm_ends_at_a_finger_unless_it_is_asked_for(write, caplog):
+    path = write(robot(joint("j1", "a", "b"), joint("gripper", "b", "c", "prismatic")))
+    with pytest.raises(InvalidInputError, match=r"joint 'gripper' of the only one seems to belong to a gripper: 'c'"):
+        from_urdf(path)
+    assert from_urdf(path, tip="c").joints == 2
+    assert "the last joint of the arm, 'gripper', seems to belong to a gripper" in caplog.text
+
+
+@pytest.mark.parametrize("link", ["tool0", "flange", "left_hand", "r_tcp", "ee_link", "gripper_l_base", "tool"])
+def test_tool_frames_come_first(write, link):
+    links = ("a", link, "b", "c")
+    joints = joint("j1", "a", link), joint("j2", link, "b"), joint("finger", "b", "c")
+    first, second = arms.tips(write(robot(*joints, links=links)))
+    assert (first.link, first.leaf, first.gripper) == (link, False, False)
+    assert (second.link, second.leaf, second.gripper) == ("c", True, True)
+
+
 PAIR = (joint("j1", "a", "b"), joint("j2", "b", "c"))
 
 
@@ -161,8 +242,16 @@ BAD_FILES = [
     (limits('upper="1" velocity="0"'), "velocity limit above 0"),
     (limits('lower="2" upper="1" velocity="1"'), "limits lower < upper, got 2 and 1"),
     (limits('velocity="1"'), "limits lower < upper, got 0 and 0"),
-    (with_joint(inside='<axis xyz="0 0 0"/>' + LIMIT), "axis of unit length"),
-    (with_joint(inside='<axis xyz="0 0 2"/>' + LIMIT), "axis of unit length"),
+    (with_joint(inside='<axis xyz="0 0 0"/>' + LIMIT), "axis with a direction"),
+    (with_joint(inside='<origin RPY="0 1 0"/>' + LIMIT), "<origin> 'RPY'. Did you mean 'rpy'"),
+    (with_joint(inside='<origin wxyz="1 0 0 0"/>' + LIMIT), "no attribute of <origin> 'wxyz'"),
+    (with_joint(inside='<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/>' + LIMIT), "rpy or quat_xyzw in <origin>, got both"),
+    (with_joint(inside='<origin quat_xyzw="0 0 0 0"/>' + LIMIT), "quat_xyzw of unit length"),
+    (with_joint(inside='<axis xzy="0 0 1"/>' + LIMIT), "<axis> 'xzy'. Did you mean 'xyz'"),
+    (limits('Lower="-1" upper="1" velocity="1"'), "<limit> 'Lower'. Did you mean 'lower'"),
+    (with_joint(inside='<Origin rpy="0 1 0"/>' + LIMIT), "<joint> 'Origin'. Did you mean 'origin'"),
+    (with_joint("continuous", '<limits velocity="1"/>'), "<joint> 'limits'. Did you mean 'limit'"),
+    (limits('lower="-170" upper="170" velocity="2"'), r"two turns, got -170 and 170: degrees\?"),
     (with_joint(inside=LIMIT.replace("2.5", "∞")), "upper to be a finite number"),
     (with_joint(inside=LIMIT.replace("3", "1 2")), "velocity to be a finite number"),
 ]

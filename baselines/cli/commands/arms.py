@@ -80,6 +80,8 @@ def _choice(name: str, found: Sequence[Tip]) -> str:
 def _tip_row(tip: Tip) -> tuple[str, ...]:
     kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(tip.kinds).items())
     ends = f"cannot be read: {tip.fault}" if tip.fault else f"{tip.joints[0]} … {tip.joints[-1]}"
+    if tip.gripper and not tip.fault:
+        ends += ", which seems to belong to a gripper"
     return tip.link, str(len(tip.joints)), kinds, ends
 
 
@@ -92,9 +94,11 @@ def _table(name: str, arm: Arm) -> str:
         units = unit, unit, f"{unit}/s", f"{unit}/s²"
         cells = [f"{x:.4g} {per}" if np.isfinite(x) else "none" for x, per in zip(limits, units, strict=True)]
         rows.append((joint, "prismatic" if prismatic else "revolute", *cells))
-    tool = shell.numbers(arm.forward(np.zeros(arm.joints))[1])
+    rotation, position = arm.forward(np.zeros(arm.joints))
+    x, z = (f"its {axis} axis along ({shell.numbers(rotation[:, i])})" for i, axis in ((0, "x"), (2, "z")))
+    tool = f"tool at ({shell.numbers(position)}) m, {x}, {z}, where q = 0"
     home = "none stated" if arm.home is None else f"({shell.numbers(arm.home)}) rad or m"
-    title = f"{name}: {arm.joints} joints, tool at ({tool}) m where q = 0, home posture {home}"
+    title = f"{name}: {arm.joints} joints, {tool}, home posture {home}"
     return "\n\n".join([textwrap.fill(title, shell.width()), shell.aligned(rows, shell.width()), *_bodies(arm)])
 
 

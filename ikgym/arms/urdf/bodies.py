@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ikgym.arms.arm import Arm
 from ikgym.arms.bodies import Bodies
 from ikgym.arms.urdf import xml
+from ikgym.arms.urdf.chain import read_origin
 from ikgym.arms.urdf.covering import Capsule
 from ikgym.arms.urdf.geometry import Solid, read_solid
 from ikgym.arms.urdf.tree import Tree
@@ -77,8 +78,7 @@ def _origin(where: str, element: Element) -> tuple[FloatArray, FloatArray]:
     """Rotation and position of the ``<origin>`` of an element."""
     import pinocchio
 
-    origin = xml.optional(where, element, "origin")
-    xyz, rpy = (xml.numbers(where, origin, key, 3) for key in ("xyz", "rpy"))
+    xyz, rpy = read_origin(where, element)
     return pinocchio.rpy.rpyToMatrix(*rpy), np.array(xyz)
 
 

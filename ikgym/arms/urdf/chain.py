@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from typing import NamedTuple
@@ -10,18 +11,37 @@ from xml.etree.ElementTree import Element
 from ikgym.arms.urdf import xml
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import known_names
+from ikgym.validation import LARGEST, known_names
+
+logger = logging.getLogger("ikgym")
 
 MOVING = ("revolute", "continuous", "prismatic")
 # Those that must have limits of their coordinate.
 BOUNDED = ("revolute", "prismatic")
 READABLE = (*MOVING, "fixed")
-# Files round their axes, to (0.71, 0.71, 0) at worst; a length further from 1 is a mistake.
-AXIS_TOLERANCE = 1e-2
+# Files round their axes, to (0.71, 0.71, 0) at worst; a length further from 1 is reported.
+ROUNDING = 1e-2
+# Limits of a revolute joint in [rad] beyond the first are taken for degrees, and beyond the second for no limits:
+# public files have ±1e6 and ±1e16. Velocities in [rad/s] beyond the third are reported only: many public files have 100
+# or 1000.
+TWO_TURNS, ENDLESS, FAST = 4.0 * math.pi, 1e4, 50.0
+
+#: Attributes of a limit: those of URDF, of its version 1.2, and others of public files.
+LIMITS = (
+    *("lower", "upper", "velocity", "effort"),
+    *("acceleration", "deceleration", "jerk"),
+    *("command_effort", "current", "gear_velocity", "k_velocity"),
+)
+#: Elements of a joint that place it or limit it. Others pass, unless their names are nearly these.
+ELEMENTS = ("parent", "child", "origin", "axis", "limit", "mimic")
 
 #: Words in names of frames that are meant as the tip: ``tool0``, ``r_gripper_tool_frame``, ``panda_hand_tcp``.
 WORDS = ("tool", "tcp", "end_effector", "ee", "eef", "flange", "grasp", "grasping", "gripper", "hand")
-_FRAME = re.compile(rf"(?:.*_)?({'|'.join(WORDS)})\d*(?:_frame|_link)*", re.IGNORECASE)
+_FRAME = re.compile(
+    rf"(?:.*_)?(?:({'|'.join(WORDS)})\d*(?:_frame|_link)*|gripper(?:_[a-z0-9]+)?_base(?:_link)?)", re.IGNORECASE
+)
+#: Parts of names of joints that belong to a gripper.
+_FINGER = re.compile("gripper|finger|thumb|index|little|pinky|jaw|knuckle|claw", re.IGNORECASE)
 
 
 class UrdfJoint(NamedTuple):
@@ -32,10 +52,11 @@ class UrdfJoint(NamedTuple):
         kind: One of ``READABLE``.
         xyz: Where the joint is in the frame of the joint before, in [m]. Three numbers.
         rpy: Roll, pitch and yaw of its frame in [rad]. Three numbers.
-        axis: Direction of its axis in its frame, nearly of unit length. Three numbers.
+        axis: Direction of its axis in its frame, of unit length. Three numbers.
         lower: Lower limit in [rad] or [m], -inf where there is none.
         upper: Upper limit in [rad] or [m], inf where there is none.
         velocity: Largest speed in [rad/s] or [m/s], inf where there is none.
+        remarks: What a user should know about these numbers.
     """
 
     name: str
@@ -46,6 +67,7 @@ class UrdfJoint(NamedTuple):
     lower: float
     upper: float
     velocity: float
+    remarks: tuple[str, ...] = ()
 
 
 class Tip(NamedTuple):
@@ -56,20 +78,36 @@ class Tip(NamedTuple):
         joints: Names of the moving joints from the base to it.
         kinds: Their kinds: ``revolute``, ``continuous``, ``prismatic``, or one that no arm has.
         fault: Why :func:`ikgym.arms.from_urdf` cannot read the chain; empty where it can.
+        leaf: Whether no link is below it.
     """
 
     link: str
     joints: tuple[str, ...]
     kinds: tuple[str, ...]
     fault: str = ""
+    leaf: bool = True
+
+    @property
+    def frame(self) -> bool:
+        """Whether its name is that of a tool frame, such as ``tool0``, ``flange`` or ``panda_hand``."""
+        return _FRAME.fullmatch(self.link) is not None
+
+    @property
+    def gripper(self) -> bool:
+        """Whether the last joint has a name of a gripper's."""
+        return of_gripper(self.joints[-1])
+
+
+def of_gripper(joint: str) -> bool:
+    """Whether a joint belongs to a gripper, by its name."""
+    return _FINGER.search(joint) is not None
 
 
 def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list[UrdfJoint]]:
     """The link at the beginning of a chain, and its joints.
 
     The links of the whole file must be a tree. Numbers are checked between the two links only: no other joint
-    has a say in where the tip is. Without a base it begins at the root, and without a tip it ends at the only leaf that
-    moves.
+    has a say in where the tip is. Without a base it begins at the root, without a tip it ends at :func:`only_tip`.
     """
     known_names("link", [link for link in (base, tip) if link is not None], tree.links)
     base = tree.root if base is None else base
@@ -82,32 +120,50 @@ def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list
 
 
 def only_tip(tree: Tree, base: str) -> str:
-    """The one leaf below the base that moves; the only leaf where none does."""
-    leaves = tree.leaves(base)
-    found = [tip.link for tip in likely_tips(tree, base)] if len(leaves) > 1 else leaves
-    if not found:
+    """The one leaf below the base that moves, else the one tool frame; never a link that a gripper moves.
+
+    Tool frames on one chain, such as a hand and its ``tcp``, count as one.
+    """
+    found = likely_tips(tree, base)
+    leaves = [tip for tip in found if tip.leaf]
+    if not leaves:
+        if len(tree.leaves(base)) == 1:
+            return tree.leaves(base)[0]
         raise InvalidInputError(f"expected a joint that moves below link {base!r}, got none.")
-    if len(found) > 1:
-        raise InvalidInputError(f"expected a tip, since there are several: {xml.listing(found)}.")
-    return found[0]
+    if len(leaves) == 1 and not leaves[0].gripper:
+        return leaves[0].link
+    frames = [tip for tip in found if tip.frame and not tip.fault and not tip.gripper]
+    passed = [xml.required("", joint, "child").get("link") for joint in tree.path(base, (frames or found)[0].link)]
+    if frames and all(tip.link in passed for tip in frames):
+        logger.info("the arm ends at %r, the only tool frame", frames[0].link)
+        return frames[0].link
+    links = xml.listing([tip.link for tip in found])
+    if len(leaves) == 1:
+        raise InvalidInputError(
+            f"expected a tip, since joint {leaves[0].joints[-1]!r} of the only one seems to belong to a gripper: "
+            f"{links}, or the link before that joint."
+        )
+    raise InvalidInputError(f"expected a tip, since there are several: {links}.")
 
 
 def likely_tips(tree: Tree, base: str) -> list[Tip]:
-    """The leaves below a base that move: readable ones, tool frames, and long chains first."""
-    found = [_tip(leaf, tree.path(base, leaf)) for leaf in tree.leaves(base)]
+    """Leaves and tool frames below a base that move: readable ones, tool frames, no fingers, and long chains first."""
+    leaves = tree.leaves(base)
+    links = [link for link in tree.below(base) if link in leaves or _FRAME.fullmatch(link)]
+    found = [_tip(link, tree.path(base, link), link in leaves) for link in links]
     return sorted((tip for tip in found if tip.joints), key=_order)
 
 
-def _order(tip: Tip) -> tuple[bool, bool, int, int]:
+def _order(tip: Tip) -> tuple[bool, bool, bool, int, bool, int]:
     frame = _FRAME.fullmatch(tip.link)
-    word = len(WORDS) if frame is None else WORDS.index(frame[1].lower())
-    return bool(tip.fault), frame is None, -len(tip.joints), word
+    word = WORDS.index(frame[1].lower()) if frame and frame[1] else len(WORDS)
+    return bool(tip.fault), not tip.frame, tip.gripper, -len(tip.joints), not tip.leaf, word
 
 
-def _tip(link: str, path: list[Element]) -> Tip:
+def _tip(link: str, path: list[Element], leaf: bool) -> Tip:
     moving = [joint for joint in path if joint.get("type") != "fixed"]
     names, kinds = (tuple(joint.get(key, "") for joint in moving) for key in ("name", "type"))
-    return Tip(link, names, kinds, _fault(path))
+    return Tip(link, names, kinds, _fault(path), leaf)
 
 
 def _fault(path: list[Element]) -> str:
@@ -128,18 +184,62 @@ def read_joint(element: Element) -> UrdfJoint:
         )
     if element.find("mimic") is not None:
         raise InvalidInputError(f"{where}: expected a joint that moves on its own, got one with <mimic>.")
+    xml.known_elements(where, element, ELEMENTS)
+    xyz, rpy = read_origin(where, element)
+    axis, remarks = _axis(where, element) if kind in MOVING else ((1.0, 0.0, 0.0), [])
+    limits = _limits(where, element, kind)
+    return UrdfJoint(name, kind, xyz, rpy, axis, *limits, tuple(remarks + _doubts(where, kind, *limits)))
+
+
+def read_origin(where: str, element: Element) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position in [m], and roll, pitch and yaw in [rad], of the ``<origin>`` of an element; zeros without one.
+
+    URDF 1.1 has ``quat_xyzw`` in place of ``rpy``.
+    """
     origin = xml.optional(where, element, "origin")
+    if origin is not None:
+        xml.known_attributes(where, origin, ("xyz", "rpy", "quat_xyzw"))
     xyz, rpy = (xml.numbers(where, origin, key, 3) for key in ("xyz", "rpy"))
-    axis = _axis(where, element) if kind in MOVING else (1.0, 0.0, 0.0)
-    return UrdfJoint(name, kind, xyz, rpy, axis, *_limits(where, element, kind))
+    if origin is None or "quat_xyzw" not in origin.attrib:
+        return xyz, rpy
+    if "rpy" in origin.attrib:
+        raise InvalidInputError(f"{where}: expected rpy or quat_xyzw in <origin>, got both.")
+    return xyz, _to_rpy(where, xml.numbers(where, origin, "quat_xyzw", 4))
 
 
-def _axis(where: str, element: Element) -> tuple[float, ...]:
+def _to_rpy(where: str, quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    """Roll, pitch and yaw in [rad] of a unit quaternion (x, y, z, w)."""
+    if abs(math.hypot(*quaternion) - 1.0) > ROUNDING:
+        raise InvalidInputError(f"{where}: expected quat_xyzw of unit length, got {quaternion}.")
+    x, y, z, w = quaternion
+    # Twice the sums and differences of yaw and roll, which stay exact where the pitch is a quarter turn.
+    both, apart = math.atan2(x + z, w - y), math.atan2(z - x, w + y)
+    pitch = 2.0 * math.atan2(math.hypot(w + y, z - x), math.hypot(w - y, x + z)) - 0.5 * math.pi
+    return both - apart, pitch, both + apart
+
+
+def _axis(where: str, element: Element) -> tuple[tuple[float, ...], list[str]]:
+    """The axis of a joint, of unit length, and a remark where it was not."""
     given = xml.optional(where, element, "axis")
-    axis = (1.0, 0.0, 0.0) if given is None else xml.numbers(where, given, "xyz", 3)
-    if abs(math.hypot(*axis) - 1.0) > AXIS_TOLERANCE:
-        raise InvalidInputError(f"{where}: expected an axis of unit length, got {axis}.")
-    return axis
+    if given is None:
+        return (1.0, 0.0, 0.0), []
+    xml.known_attributes(where, given, ("xyz",))
+    axis = xml.numbers(where, given, "xyz", 3)
+    length = math.hypot(*axis)
+    if not 1e-9 < length < LARGEST:
+        raise InvalidInputError(f"{where}: expected an axis with a direction, got {axis}.")
+    if abs(length - 1.0) <= ROUNDING:
+        return axis, []  # rounded: Pinocchio and the arm scale it
+    return tuple(x / length for x in axis), [f"{where}: its axis {axis} was scaled to unit length"]
+
+
+def _doubts(where: str, kind: str, lower: float, upper: float, velocity: float) -> list[str]:
+    """Remarks on limits that are unusual."""
+    if kind == "continuous" and not math.isfinite(velocity):
+        return [f"{where}: it is continuous and has no velocity limit, so no speed is too fast for it"]
+    if kind == "prismatic" or not FAST < velocity < math.inf:
+        return []
+    return [f"{where}: degrees? Its velocity limit is {velocity:g} rad/s"]
 
 
 def _limits(where: str, element: Element, kind: str) -> tuple[float, float, float]:
@@ -149,6 +249,7 @@ def _limits(where: str, element: Element, kind: str) -> tuple[float, float, floa
     if limit is None and kind in BOUNDED:
         raise InvalidInputError(f"{where}: expected a <limit>, got none; an endless joint is of type 'continuous'.")
     if limit is not None:
+        xml.known_attributes(where, limit, LIMITS)
         xml.attribute(where, limit, "velocity")
         (velocity,) = xml.numbers(where, limit, "velocity", 1)
         if velocity <= 0.0:
@@ -159,4 +260,9 @@ def _limits(where: str, element: Element, kind: str) -> tuple[float, float, floa
         (lower,), (upper,) = (xml.numbers(where, limit, key, 1) for key in ("lower", "upper"))
         if lower >= upper:
             raise InvalidInputError(f"{where}: expected limits lower < upper, got {lower:g} and {upper:g}.")
+        if kind == "revolute" and TWO_TURNS < max(-lower, upper) < ENDLESS:
+            raise InvalidInputError(
+                f"{where}: expected limits in radians within two turns, got {lower:g} and {upper:g}: degrees? A joint "
+                "that turns without end is of type 'continuous'."
+            )
     return lower, upper, velocity

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,11 +14,13 @@ import numpy.typing as npt
 from ikgym.arms.arm import Arm
 from ikgym.arms.source import UrdfReference
 from ikgym.arms.urdf.bodies import with_bodies
-from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, read_chain
+from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, of_gripper, read_chain
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
 from ikgym.validation import FloatArray, about, flag, frozen_array, known_name, rotation_matrix
+
+logger = logging.getLogger("ikgym")
 
 # Descriptions of whole humanoids take a few hundred kilobytes.
 MAX_BYTES = 16 * 2**20
@@ -55,15 +58,16 @@ def from_urdf(
     around it where that is smaller; a mesh the smallest capsule around its corners that a search finds. The log states
     the volumes, and the pairs that always touch, which are ignored.
 
-    An axis whose length differs from 1 by more than 1e-2 is an error; within that it is taken to be rounded,
-    and is scaled to unit length. Files with a DOCTYPE, of more than 16 MiB, or with more than 128 joints
-    between the two links are refused.
+    Axes are scaled to unit length; the log names those that are off by more than 1e-2, velocity limits above 50 rad/s,
+    which may be in degrees, and continuous joints without one. Refused are limits of more than two turns, up to 1e4
+    rad; unknown attributes, such as ``RPY``, and elements that are nearly known, such as ``<limits>``, between the two
+    links; and files with a DOCTYPE, of more than 16 MiB, or with more than 128 joints between the two links.
 
     Args:
         path: The file.
         base: The link to begin at, whose frame becomes the base frame. The root link if it is left out.
-        tip: The link to end at, whose frame becomes the tool's if there is no tool offset. The only leaf below the
-            base that moves if it is left out; :func:`tips` lists them.
+        tip: The link to end at, whose frame becomes the tool's if there is no tool offset. If it is left out, the only
+            leaf below the base that moves, or the only tool frame, but no finger; :func:`tips` lists them.
         name: Name of the arm, by default that of the robot in the file.
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
@@ -105,14 +109,19 @@ def from_urdf(
         file = Path(path).resolve()
         arm = with_bodies(arm, tree, begin, file.parent if meshes else None)
         object.__setattr__(arm, "urdf", UrdfReference(file, base, tip, tool, tool_rotation, meshes))
+        remarks = [remark for joint in joints for remark in joint.remarks]
+        if of_gripper(moving[-1].name):
+            remarks.append(f"the last joint of the arm, {moving[-1].name!r}, seems to belong to a gripper")
+        for remark in remarks:
+            logger.warning("%s: %s.", file.name, remark)
         return arm
 
 
 def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ...]:
-    """The links of a URDF file that may be the tip: leaves that move, likely ones first.
+    """The links of a URDF file that may be the tip: leaves and tool frames that move, likely ones first.
 
-    Those whose chain :func:`from_urdf` reads come before all others; among them tool frames by their names, then those
-    with the most joints.
+    Those whose chain :func:`from_urdf` reads come before all others; among them tool frames by their names, leaves or
+    not, then links that no finger moves, then those with the most joints.
 
     Args:
         path: The file.

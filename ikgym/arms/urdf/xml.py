@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Collection
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 
@@ -76,6 +77,20 @@ def attribute(where: str, element: Element, key: str, choices: Collection[str] |
             f"{where}: expected {key} of <{element.tag}> to be one of {listing(choices)}; got {value!r}."
         )
     return value
+
+
+def known_attributes(where: str, element: Element, names: Collection[str]) -> None:
+    """Refuses unknown attributes, which would count as absent; a prefix marks those of a vendor."""
+    for name in element.attrib:
+        if name not in names and ":" not in name:
+            raise InvalidInputError(f"{where}: {UnknownNameError(f'attribute of <{element.tag}>', name, names)}")
+
+
+def known_elements(where: str, element: Element, names: Collection[str]) -> None:
+    """Refuses elements whose names are nearly known, such as <Origin> or <limits>; others are a vendor's."""
+    for tag in (child.tag for child in element if child.tag not in names):
+        if difflib.get_close_matches(tag.lower(), names, cutoff=0.8):
+            raise InvalidInputError(f"{where}: {UnknownNameError(f'element of <{element.tag}>', tag, names)}")
 
 
 def numbers(where: str, element: Element | None, key: str, count: int) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ ROBOTS = Path(__file__).parents[2] / "robots"
 CHAINS = {
     "ur10": ("base_link", "tool0", 6, 2),
     "ur10_rail": ("world", "tool0", 7, 3),
-    "baxter": ("torso", "left_gripper", 7, 23),
+    "baxter": ("torso", "left_gripper", 7, 27),
     "pr2": ("base_link", "r_gripper_tool_frame", 8, 25),
 }
 
