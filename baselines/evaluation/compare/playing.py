@@ -9,9 +9,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from baselines import registry
 from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
-from baselines.evaluation.compare.rule import PREFERRED, Recommendation, Rows, fault, needs_retiming, recommend
+from baselines.evaluation.compare.library_times import with_library_times
+from baselines.evaluation.compare.rule import PREFERRED, RULE, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
 from baselines.evaluation.summary import summarise
@@ -23,6 +25,8 @@ from ikgym.scenarios import Scenario
 
 #: Names of the paths in tables.
 AS_IT_IS, RETIMED, LATE = "as it is", "retimed", "late drives"
+#: Remark on the times of solvers of other projects.
+LIBRARY = "p50, p99 of pink and mink: calls of the library alone; with late drives all calls of the controller"
 #: Drives with a lag of first order, its time constant in [s], and a delay in steps.
 LAG, DELAY = 0.02, 2
 
@@ -44,9 +48,10 @@ class Comparison:
         ]
         columns = fitting(COLUMNS, lines, width)
         texts = [
-            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller"
+            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller",
+            *[LIBRARY] * any(registry.get(row.policy).rival for row in self.rows),
         ]
-        below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes)]
+        below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes, RULE)]
         last = textwrap.fill(str(self.recommendation), width)
         return "\n".join([plain(columns, lines, width), "", *below, "", last])
 
@@ -84,12 +89,15 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     paths = [scenario.replace(name=AS_IT_IS), *_retimed(scenario, notes)]
     played = evaluate(paths, PREFERRED, progress=progress)
     notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
-    as_it_is, retimed = (_by_solver(played, name) for name in (AS_IT_IS, RETIMED))
+    rows = [*played]
+    for path in paths:
+        rows = [with_library_times(row, path) if row.scenario == path.name else row for row in rows]
+    as_it_is, retimed = (_by_solver(rows, name) for name in (AS_IT_IS, RETIMED))
     taken = paths[needs_retiming(as_it_is, retimed, scenario.dt)]
     driven = taken.replace(name=LATE, plant=late(scenario.plant))
     delayed = evaluate(driven, [(PREDICTED, {"policy": name, **SETTINGS}) for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
-    return Comparison(scenario.dt, [*played, *delayed], chosen, notes)
+    return Comparison(scenario.dt, [*rows, *delayed], chosen, notes)
 
 
 def late(plant: Plant) -> Plant:

@@ -13,8 +13,15 @@ PREFERRED = ("qp", "sns", "rhc_foresight", "dls", "pink", "mink")
 #: Share of the control period that the median call may take. Its 99th percentile, on a computer without real time, is
 #: that of other programs.
 SHARE = 0.5
-#: How many times the least joint acceleration of a solver counts as calm.
-CALM = 3.0
+#: How many times the least joint acceleration of a solver counts as calm, and how many times the smallest product of
+#: error and acceleration counts as equally good.
+CALM, ALIKE = 3.0, 2.0
+#: The rule in one sentence.
+RULE = (
+    "Of the solvers that follow (with late drives too, if any does) and accelerate at most "
+    f"{CALM:g} times as much as the calmest, the one with the smallest product of largest error and largest "
+    f"acceleration is recommended; up to {ALIKE:g} times that product, the first in the order {', '.join(PREFERRED)}."
+)
 
 #: One row a solver, by its name.
 Rows = Mapping[str, Row]
@@ -64,7 +71,9 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
     1. The path is taken as it is if a solver follows it, else retimed.
     2. Of the solvers that follow it, those are kept that follow with late drives, if any do.
     3. Of these, those are kept whose largest joint acceleration is at most three times the least.
-    4. Of these, the first is taken in the order of :data:`PREFERRED`.
+    4. Of these, those are kept whose product of largest error and largest joint acceleration is at most twice the
+       smallest. The error counts in [mm] or [mrad], whichever is larger.
+    5. Of these, the first is taken in the order of :data:`PREFERRED`.
 
     Args:
         as_it_is: Rows on the path as it is.
@@ -81,24 +90,34 @@ def recommend(as_it_is: Rows, retimed: Rows, late: Rows, dt: float) -> Recommend
     robust = [name for name in able if name in followers(late, dt)]
     kept = robust or able
     least = min(rows[name].qddot_peak for name in kept)
-    solver = next(name for name in kept if rows[name].qddot_peak <= CALM * least)
+    calm = [name for name in kept if rows[name].qddot_peak <= CALM * least]
+    best = min(_product(rows[name]) for name in calm)
+    solver = next(name for name in calm if _product(rows[name]) <= ALIKE * best)
     before = [name for name in PREFERRED[: PREFERRED.index(solver)] if name in rows]
     also = "with late drives too" if robust else "but not with late drives"
     reasons = [
         *[missed] * slower,
-        *(f"{name} {_drawback(name, rows, late if robust else {}, dt, least)}." for name in before),
+        *(f"{name} {_drawback(name, rows, late if robust else {}, dt, least, solver)}." for name in before),
         f"{solver} follows the path, {also}.",
     ]
     return Recommendation(solver, slower, bool(robust), " ".join(reasons))
 
 
-def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float) -> str:
+def _product(row: Row) -> float:
+    """Largest error in [mm] or [mrad], whichever is larger, times largest joint acceleration."""
+    return 1e3 * max(row.position_error_max, row.orientation_error_max or 0.0) * row.qddot_peak
+
+
+def _drawback(name: str, rows: Rows, late: Rows, dt: float, least: float, solver: str) -> str:
     """Why a solver was passed over."""
     if why := fault(rows[name], dt):
         return why
     if name in late and (why := fault(late[name], dt)):
         return f"{why} with late drives"
-    return f"needs {number(rows[name].qddot_peak / least)} times the acceleration of the calmest"
+    if rows[name].qddot_peak > CALM * least:
+        return f"needs {number(rows[name].qddot_peak / least)} times the acceleration of the calmest"
+    times = number(_product(rows[name]) / _product(rows[solver])) if _product(rows[solver]) else "many"
+    return f"has {times} times the product of error and acceleration"
 
 
 def _first_fault(rows: Rows, dt: float) -> str:

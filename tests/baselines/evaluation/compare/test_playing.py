@@ -1,9 +1,14 @@
 """Solvers on three paths; two of them, so that it takes little time."""
 
+import time
+
+import pytest
+
 import ikgym
 from baselines.evaluation import report
-from baselines.evaluation.compare import playing
+from baselines.evaluation.compare import library_times, playing, rule
 from baselines.evaluation.compare.playing import compare
+from baselines.solvers.rivals.base import Rival
 
 
 def test_a_path_out_of_reach_has_no_solver(monkeypatch):
@@ -16,6 +21,8 @@ def test_a_path_out_of_reach_has_no_solver(monkeypatch):
     ]
     text = found.table(80)
     assert "Recommended: none of these solvers. No solver follows the path: qp errs by" in text
+    assert " ".join(text.split()).count(rule.RULE) == 1
+    assert playing.LIBRARY not in text
     assert max(len(line.replace("\u0307", "")) for line in text.splitlines()) <= 80
     assert {"q̈", "stop", "follows"} <= set(text.splitlines()[0].split())
 
@@ -32,3 +39,21 @@ def test_what_is_left_out_is_named(monkeypatch):
     assert retimed == "not retimed: No module named 'toppra'"
     assert rival.startswith("left out: pink: ")
     assert {row.policy for row in found.rows} == {"qp", "predicted"}
+
+
+def test_times_of_a_library_are_those_of_its_own_calls(monkeypatch):
+    """A conversion that takes 20 ms does not count."""
+    pytest.importorskip("mink")
+    monkeypatch.setattr(playing, "PREFERRED", ("dls", "mink"))
+    monkeypatch.setattr(library_times, "STEPS", 5)
+    seen = Rival.seen
+
+    def slow(policy, *observed):
+        time.sleep(0.02)
+        return seen(policy, *observed)
+
+    monkeypatch.setattr(Rival, "seen", slow)
+    found = compare(ikgym.scenarios.get("panda-circle").replace(steps=6))
+    times = {row.policy: row.time_p50_us for row in found.rows if row.scenario == playing.AS_IT_IS}
+    assert times["mink"] < 15e3
+    assert " ".join(playing.LIBRARY.split()) in " ".join(found.table(80).split())

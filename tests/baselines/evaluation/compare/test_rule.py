@@ -27,7 +27,7 @@ def test_qp_is_taken_where_nothing_stands_in_the_way():
     chosen = recommend(rows(), rows(), rows(), DT)
     assert (chosen.solver, chosen.retimed, chosen.late) == ("qp", False, True)
     assert str(chosen) == "Recommended: qp. qp follows the path, with late drives too."
-    edge = {"qddot_peak": 3.0, "time_p50_us": 2000.0}  # of what is allowed
+    edge = {"qddot_peak": 2.0, "time_p50_us": 2000.0}  # of what is allowed
     assert recommend(rows(qp=edge), {}, rows(), DT).solver == "qp"
     # The calmest is one of those that follow.
     assert recommend(rows(sns={**STOPPED, "qddot_peak": 0.1}), {}, rows(), DT).solver == "qp"
@@ -72,3 +72,18 @@ def test_a_path_is_retimed_only_where_no_solver_follows_it():
     chosen = recommend(ALL_MISS, rows(qp=STOPPED, sns=MISSES, dls=SLOW), rows(), DT)
     assert (chosen.solver, chosen.retimed) == (None, False)
     assert str(chosen) == "Recommended: none of these solvers. No solver follows the path: qp errs by 12.3 mm."
+
+
+def test_error_and_acceleration_decide_between_solvers_that_follow():
+    """Errors of 1/100 with half of the acceleration in the same time; and a small error is not worth every jerk."""
+    better = {"position_error_max": 1e-8, "orientation_error_max": 1e-8, "qddot_peak": 0.5}
+    chosen = recommend(rows(sns=better), {}, rows(), DT)
+    assert chosen.solver == "sns"
+    assert chosen.reason.startswith("qp has 200.0 times the product of error and acceleration. sns follows")
+    assert recommend(rows(sns=better | {"qddot_peak": 3.1}), {}, rows(), DT).solver == "qp"
+    # The larger one of both errors counts, and twice the product is alike.
+    assert recommend(rows(sns={"position_error_max": 1e-8}), {}, rows(), DT).solver == "qp"
+    assert recommend(rows(qp={"qddot_peak": 1.9}), {}, rows(), DT).solver == "qp"
+    assert (
+        recommend(rows(dls={"position_error_max": 0.0, "orientation_error_max": None}), {}, rows(), DT).solver == "dls"
+    )
