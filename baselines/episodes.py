@@ -1,4 +1,4 @@
-"""Plays episodes and records them: the one loop behind evaluation, leaderboard, oracle, training, viewer and papers."""
+"""Plays episodes and records them: the one loop behind evaluation, oracle, training, viewer and papers."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ import tyro
 from matplotlib.figure import Figure
 
 from baselines.evaluation.plots import style
-from baselines.evaluation.records import from_csv, to_csv
+from baselines.evaluation.table import from_csv, to_csv
 from baselines.files import write
 from baselines.training.methods import BY_REWARDS
 from baselines.training.rewards import ALGORITHMS, SETTINGS, Training, entries, read

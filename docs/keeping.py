@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from baselines.evaluation.records import from_csv, to_csv
+from baselines.evaluation.table import from_csv, to_csv
 from baselines.files import write
 
 PAGES = Path(__file__).parent

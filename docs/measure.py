@@ -25,7 +25,9 @@ from baselines.agents.files import AgentFile, save_agent
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots.comparison import front
-from baselines.evaluation.records import LOWEST, records
+from baselines.evaluation.rankings import ranking
+from baselines.evaluation.summary import LOWEST
+from baselines.evaluation.table import records
 from docs import compare, contexts, loop, obstructed, retimed
 from docs.keeping import RUNS, WORK, Line, keep, lines, resumable
 
@@ -82,7 +84,7 @@ def _group(name: str, old: list[Line], only_new: bool) -> list[Line]:
         played = [policy for line in some for policy in policies(line)]
         rows = evaluate(scenario, played, episodes=episodes, **resumable(f"{name}-{old[0]['scenario']}-{episodes}"))
         before = {line["policy"]: line for line in some}  # with columns that say which policy this is
-        found += [before[one["policy"]] | one | _error(one, rows) for one in records(rows, list(before))]
+        found += [before[one["policy"]] | one | _error(one, rows) for one in records(ranking(rows, list(before)))]
     best = front(found) if "front" in old[0] else []
     found = [{**line, "front": "yes" if line in best else "no"} for line in found]
     return sorted(found, key=lambda line: float(line["cost_ratio"]))
@@ -151,7 +153,7 @@ def plants(*, only_new: bool = False) -> list[Line]:
 
 def _adaptive(line: Line) -> Line:
     rows = evaluate(line["scenario"], [ADAPTIVE[line["policy"]]], episodes=int(line["episodes"]), progress=True)
-    [found] = records(rows)
+    [found] = records(ranking(rows))
     return {**line, **{column: found[column] for column in ("cost_ratio", "low", "high", "worst")}}
 
 

@@ -14,7 +14,7 @@ import baselines
 import ikgym
 from baselines.cli.commands.policies import summary
 from baselines.evaluation import test_sets as sets
-from baselines.evaluation.records import markdown as results_table
+from baselines.evaluation.table import markdown as results_table
 from baselines.registry import get
 from baselines.status import Status
 from docs.keeping import PAGES, lines

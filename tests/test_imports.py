@@ -68,7 +68,7 @@ def test_names_import_no_policy_and_read_no_agent(process, loaded):
 
 
 def test_no_mode_imports_no_matplotlib_and_pictures_import_no_pyplot(loaded):
-    assert "matplotlib" not in loaded["environment"]
+    assert not {"matplotlib", "pandas"} & loaded["environment"]
     assert "matplotlib" in loaded["picture"]
     assert "matplotlib.pyplot" not in loaded["picture"]
 

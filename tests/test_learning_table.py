@@ -2,7 +2,7 @@
 
 import pytest
 
-from baselines.evaluation.records import from_csv, to_csv
+from baselines.evaluation.table import from_csv, to_csv
 from baselines.training.rewards import Training, read
 from benchmarks import learning
 from ikgym import rl

@@ -31,7 +31,7 @@ def _called(decorator: ast.expr) -> ast.expr:
 
 def test_all_but_kernels_have_types():
     found = {str(path.relative_to(ROOT)): untyped(path.read_text(encoding="utf-8")) for path in SOURCES}
-    assert len(found) > 400
+    assert len(found) > 300
     assert {path: names for path, names in found.items() if names} == {}
 
 

@@ -18,8 +18,6 @@ COMMANDS = {
     "tune": "search settings of solvers",
     "dataset": "write episodes as a Minari data set",
     "reproduce": "draw the figures of the papers again, and test their claims",
-    "leaderboard": "compare policies on test sets in one table with intervals",
-    "robustness": "map the cost of policies over severities of an imperfect plant",
     "view": "show policies side by side in a browser, live and in an episode",
     "video": "write an episode as a video",
     "oracle": "search best known costs",

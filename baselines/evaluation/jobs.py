@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import pathlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,7 +24,7 @@ from baselines.recording import Seeds
 from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios import Preview, Scenario
+from ikgym.scenarios import Preview, Scenario, imperfect
 from ikgym.scenarios.preview import offsets
 from ikgym.validation import whole_number
 
@@ -83,13 +84,20 @@ class Options:
     pairs: bool = False
     """Also play each scenario whose plant is not ideal with an ideal one, with the same seeds, to show how much the
     plant costs each policy."""
+    leaderboard: bool = False
+    """Write a table into the folder, too, in which policies are ranked by cost ratio, with intervals, and plots of cost
+    against time and foresight. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
+    severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = ()
+    """Play one scenario with its plant at all pairs of these severities, of unknown properties (calibration, payload,
+    camera) and of the drives (lag, delay), and write a map of cost ratios. 1 is the plant itself, in panda-field the
+    worst one, and 0 an ideal one."""
     progress: Annotated[bool, tyro.conf.Fixed, tyro.conf.Suppress] = False
     """Show a progress bar on stderr."""
 
     def __post_init__(self) -> None:
-        for name in ("test_sets", "export"):
+        for name in ("test_sets", "export", "severities"):
             value = getattr(self, name)
-            object.__setattr__(self, name, (value,) if isinstance(value, str) else tuple(value))
+            object.__setattr__(self, name, (value,) if isinstance(value, (str, float)) else tuple(value))
         object.__setattr__(self, "export", formats(self.export))
         if self.out is not None:
             object.__setattr__(self, "out", pathlib.Path(self.out))
@@ -224,13 +232,13 @@ def _drawn(
 
 def _episodes(options: Options) -> list[_Episodes]:
     """The episodes of all scenarios or test sets."""
-    listed = _scenarios(options.scenarios, options.steps)
+    listed = _scenarios(options)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
-        if listed or changed:
+        if listed or changed or options.severities:
             raise InvalidInputError(
                 f"A test set defines the episodes: with {', '.join(map(repr, options.test_sets))}, expected no "
-                "scenarios, episodes, split, steps or noise_seeds."
+                "scenarios, episodes, split, steps, noise_seeds or severities."
             )
         sets = [test_sets.get(name) for name in options.test_sets]
         return [_drawn(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
@@ -259,18 +267,37 @@ def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
             yield _drawn(plain.replace(name=name), dict.fromkeys(seeds.seed for seeds in one.seeds), 1)
 
 
-def _scenarios(given: str | Scenario | Iterable[str | Scenario], steps: int | None) -> list[Scenario]:
-    out: dict[str, Scenario] = {}
+def _scenarios(options: Options) -> list[Scenario]:
+    """The scenarios of an evaluation, each once, at all severities."""
+    given, out = options.scenarios, dict[str, Scenario]()
     for item in (given,) if isinstance(given, (str, Scenario)) else given:
         names = scenario_registry.names() if isinstance(item, str) and item == ALL else (item,)
-        for name in names:
-            scenario = scenario_registry.find(name)
-            if steps is not None:
-                scenario = scenario.replace(steps=min(steps, scenario.steps))
+        for scenario in map(scenario_registry.find, names):
             known = out.setdefault(scenario.name, scenario)
             if known is not scenario and fingerprint(known) != fingerprint(scenario):
                 raise InvalidInputError(
                     f"Two different scenarios are called {scenario.name!r}: rename one with "
                     "scenario.replace(name=…), so that their results can be distinguished."
                 )
-    return list(out.values())
+    found = list(out.values())
+    if options.severities:
+        if len(found) != 1 or found[0].plant.ideal:
+            raise InvalidInputError(
+                "severities: expected one scenario whose plant is not ideal, got "
+                f"{', '.join(repr(one.name) for one in found) or 'none'}."
+            )
+        found = at_severities(found[0], options.severities)
+    if options.steps is None:
+        return found
+    return [scenario.replace(steps=min(options.steps, scenario.steps)) for scenario in found]
+
+
+def at_severities(scenario: Scenario, severities: Sequence[float]) -> list[Scenario]:
+    """A scenario with its plant at all pairs of severities: of calibration, payload and camera; of lag and delay."""
+    # The plant of panda-field in the catalogue is at a severity in between.
+    field = (scenario.name, scenario.plant) == (imperfect.FIELD_NAME, imperfect.field().plant)
+    plant = imperfect.FIELD if field else scenario.plant
+    return [
+        scenario.replace(name=f"{scenario.name} {knowledge:g} {drives:g}", plant=plant.scaled(knowledge, drives))
+        for knowledge, drives in itertools.product(sorted({*severities}), repeat=2)
+    ]

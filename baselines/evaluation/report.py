@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import datetime
+import itertools
+import json
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from baselines.canonical import canonical
+import pandas as pd
+
+from baselines.evaluation.columns import BESIDE_IDEAL, FOLLOWED_NOTE, POLICIES, SPREAD, columns
 from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, LOST_ORIENTATION, LOST_POSITION, Row
-from baselines.evaluation.summary import Record, by_scenario, summarise
-from baselines.evaluation.table import NOTHING, Column, filled, fitting, number, plain
+from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION
+from baselines.evaluation.table import NOTHING, plain
 from baselines.oracle import best_known
 
 #: Characters that a line of the printed tables may have, and one of a README.
@@ -30,10 +33,6 @@ ERRORS_NOTE = (
     "pos, ori: position and orientation error; q̇, q̈ peak: joint velocity and acceleration in rad/s and rad/s², in m/s "
     "and m/s² for prismatic joints"
 )
-FOLLOWED_NOTE = (
-    f"followed: at most {1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad of error in all steps; "
-    "solver status: the worst that the solver reported"
-)
 CONTACTS_NOTE = (
     "clearance: smallest distance between bodies; stopped: episodes in which they would have met, and the arm stood "
     "still from then on"
@@ -50,164 +49,88 @@ IDEAL_NOTE = (
 )
 
 
-def _marked(line: Record) -> str:
-    """The policy with its marks, see the notes."""
-    marks = {" *": line["reference"], " †": line["steps_at_joint_limit"], " ‡": line["free_timing"]}
-    return str(line["policy"]) + "".join(mark for mark, applies in marks.items() if applies)
+def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
+    """The tables of all scenarios as plain text; notes name skipped policies, and columns that do not fit the width.
 
-
-def _followed(line: Record) -> str:
-    if line["rows"] == 1:
-        return "yes" if line["followed"] else "no"
-    return f"{line['followed']} of {line['rows']}"
-
-
-def interval(line: Record, prefix: str = "") -> str:
-    """An interval: ``1.000 … 2.000``; a dash for none."""
-    low, high = line[f"{prefix}low"], line[f"{prefix}high"]
-    return NOTHING if low is None else f"{number(low)} … {number(high)}"
-
-
-POLICY = Column("policy", "", "policy", text=_marked)
-TOTAL = Column("total", "cost", "total_cost", "geometric mean over the episodes")
-RATIO = Column("cost", "ratio", "cost_ratio", "total cost / best known cost, geometric mean over the episodes")
-ERRORS = (
-    Column("pos max", "[mm]", "position_error_mm", "largest position error"),
-    Column("ori max", "[mrad]", "orientation_error_mrad", "largest orientation error", drop=1),
-    Column("q̇ peak", "", "qdot_peak", "largest joint velocity, in rad/s or m/s", drop=2),
-    Column(
-        *("q̈ peak", "", "qddot_peak", "largest joint acceleration, in rad/s² or m/s²; § no limit stated"),
-        drop=3,
-        text=lambda line: number(line["qddot_peak"]) + " §" * (not line["first"].acceleration_stated),
-    ),
-)
-TIMES = (
-    Column("p50", "[µs]", "time_p50_us", "median time of a call after the first"),
-    Column("p99", "[µs]", "time_p99_us", "99th percentile of these times", drop=5),
-    Column("misses", "", "deadline_misses", "such calls longer than Δt", drop=6),
-)
-PATH = (
-    Column("path time", "[s]", "path_time_s", "when the end of the path was reached, with free timing"),
-    Column(
-        *("path err", "[mm]", "path_error_mm"),
-        "largest distance from the reference at the policy's own progress, with free timing",
-    ),
-)
-CONTACTS = (
-    Column("clearance", "[mm]", "clearance_mm", "smallest distance between bodies"),
-    Column("stopped", "", "stopped", "episodes in which bodies would have met"),
-)
-LOST = Column("lost", "", "lost", "episodes in which the arm was lost")
-EPISODES = Column("episodes", "", "episodes", "number of episodes; more than one of a random scenario")
-FOLLOWED = Column("followed", "", "followed", FOLLOWED_NOTE.partition(";")[0], text=_followed)
-STATUS = Column("solver", "status", "solver_status", "the worst that the solver reported in any step")
-#: The columns of the table of all policies; of the table of several episodes; and of the comparison with ideal plants.
-COLUMNS = (
-    *(POLICY, TOTAL, Column("tracking", "cost", "tracking_cost", drop=4), RATIO, *ERRORS, *PATH, *CONTACTS, *TIMES),
-    *(FOLLOWED, STATUS),
-)
-SPREAD = (
-    EPISODES,
-    Column("geometric mean", "", "mean"),
-    Column("median", "", "median"),
-    Column("p90", "", "p90"),
-    Column("worst", "", "worst"),
-    Column("worst seed", "", "worst_seed"),
-    LOST,
-)
-BESIDE_IDEAL = (
-    Column("ideal", "ratio", "ideal_cost_ratio"),
-    Column("× ideal", "cost", "times_ideal"),
-    Column("95 %", "", "times_ideal_low", text=lambda line: interval(line, "times_ideal_")),
-)
-
-
-def table(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
-    """The tables of all scenarios as plain text; notes name skipped policies, and columns that do not fit the width."""
+    Args:
+        lines: See :func:`baselines.evaluation.summary.summarise`.
+        skipped: Policies that were skipped.
+        width: Characters of a line.
+    """
     parts: list[str] = []
     absent: dict[str, None] = {}
-    for scenario, lines in by_scenario(rows).items():
-        columns = fitting(COLUMNS, lines, width)
-        absent.update(dict.fromkeys(column.title for column in filled(COLUMNS, lines) if column not in columns))
-        parts.append(f"{heading(scenario, lines)}\n{plain(columns, lines, width)}")
-        spread = SPREAD * any(line["episodes"] > 1 for line in lines)
-        spread += BESIDE_IDEAL * any(line["times_ideal"] is not None for line in lines)
+    for scenario, here in lines.groupby("scenario", sort=False):
+        text, left_out = plain(columns(POLICIES, here), here, width)
+        absent.update(dict.fromkeys(column.title for column in left_out))
+        parts.append(f"{heading(here)}\n{text}")
+        spread = SPREAD * bool((here.episodes > 1).any()) + BESIDE_IDEAL * bool(here.times_ideal.notna().any())
         if spread:
-            over = f"{lines[0]['quantity']} over the episodes of {scenario}"
-            parts.append(f"{over}\n{plain((POLICY, *spread), lines, width)}")
-    notes = remarks(rows, skipped)
+            text, _ = plain(columns(("label", *spread), here), here, width)
+            parts.append(f"{here.quantity.iloc[0]} over the episodes of {scenario}\n{text}")
+    notes = remarks(lines, skipped)
     if absent:
         notes.append(f"left out at {width} characters a line: {', '.join(absent)}")
     wrapped = (textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False) for note in notes)
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
-def readme(rows: Sequence[Row], skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
+def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
     """The README of a folder of results: tables, parameters and conditions as one block of text in Markdown."""
-    conditions = [f"command: {command}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(rows)]
-    text = "\n\n".join([table(rows, skipped, width=WIDE), *map("\n".join, (parameters(summarise(rows)), conditions))])
+    conditions = [f"command: {command}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
+    text = "\n\n".join([table(lines, skipped, width=WIDE), *map("\n".join, (parameters(lines), conditions))])
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return f"# Results\n\n{fence}text\n{text}\n{fence}\n"
 
 
-def heading(scenario: str, lines: Sequence[Record]) -> str:
-    """Scenario, number of episodes and steps."""
-    episodes = sorted({line["episodes"] for line in lines})
-    many = "" if episodes == [1] else f"{'–'.join(map(str, (episodes[0], episodes[-1])[: len(episodes)]))} episodes of "
-    return f"{scenario}: {many}{lines[0]['steps']} steps"
+def heading(lines: pd.DataFrame) -> str:
+    """Scenario, number of episodes and steps, of lines of one scenario."""
+    fewest, most = lines.episodes.min(), lines.episodes.max()
+    many = "" if most == 1 else f"{most} episodes of " if fewest == most else f"{fewest}–{most} episodes of "
+    return f"{lines.scenario.iloc[0]}: {many}{lines.steps.iloc[0]} steps"
 
 
-def parameters(lines: Sequence[Record]) -> list[str]:
+def parameters(lines: pd.DataFrame) -> list[str]:
     """All parameters of each policy in each scenario."""
     return [
-        f"{line['policy']} in {line['scenario']}: "
-        + (", ".join(f"{name}={value}" for name, value in line["first"].parameters.items()) or NOTHING)
-        for line in lines
+        f"{line.label} in {line.scenario}: "
+        + (", ".join(f"{name}={value}" for name, value in line.parameters.items()) or NOTHING)
+        for line in lines.itertuples()
     ]
 
 
-def remarks(rows: Sequence[Row], skipped: Sequence[Skipped] = ()) -> list[str]:
+def remarks(lines: pd.DataFrame, skipped: Sequence[Skipped] = ()) -> list[str]:
     """The notes below the tables."""
-    lines = summarise(rows)
     notes = {
-        REFERENCE_NOTE: any(line["reference"] for line in lines),
-        STOP_NOTE: any(line["steps_at_joint_limit"] for line in lines),
-        STATED_NOTE: not all(row.acceleration_stated for row in rows),
-        TIMING_NOTE: any(line["free_timing"] for line in lines),
-        RATIO_NOTE: any(row.cost_ratio is not None for row in rows),
+        REFERENCE_NOTE: lines.reference.any(),
+        STOP_NOTE: lines.steps_at_joint_limit.any(),
+        STATED_NOTE: not lines.stated.all(),
+        TIMING_NOTE: lines.free_timing.any(),
+        RATIO_NOTE: (lines.unknown < lines.rows).any(),
         TIMES_NOTE: True,
         ERRORS_NOTE: True,
         FOLLOWED_NOTE: True,
-        CONTACTS_NOTE: any(line["stopped"] is not None for line in lines),
-        SEVERAL_NOTE: any(line["episodes"] > 1 for line in lines),
-        NOISE_NOTE: any(row.noise_seed for row in rows),
-        IDEAL_NOTE: any(line["times_ideal"] is not None for line in lines),
+        CONTACTS_NOTE: lines.stopped.notna().any(),
+        SEVERAL_NOTE: (lines.episodes > 1).any(),
+        NOISE_NOTE: lines.noisy.any(),
+        IDEAL_NOTE: lines.times_ideal.notna().any(),
     }
-    told = [note for note, applies in notes.items() if applies]
-    return [*told, *_beaten(rows), *(f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped)]
-
-
-def _beaten(rows: Sequence[Row]) -> list[str]:
-    """The policies that beat a best known cost."""
-    seeds: dict[tuple[str, str], list[int]] = {}
-    for row in rows:
-        if best_known.beaten(row):
-            seeds.setdefault((row.policy, row.scenario), []).append(row.seed)
-    return [
-        f"{policy} beats the best known cost of {scenario}, seed {', '.join(map(str, better))}: bring the record up to "
+    beaten = [
+        f"{policy} beats the best known cost of {scenario}, seed {', '.join(map(str, seeds))}: bring the record up to "
         f"date with {best_known.UPDATE} --scenarios {scenario} --policies {policy}"
-        for (policy, scenario), better in seeds.items()
+        for (policy, scenario), some in lines.groupby(["policy", "scenario"], sort=False)
+        if (seeds := [*itertools.chain(*some.beaten)])
     ]
+    left_out = [f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped]
+    return [*(note for note, applies in notes.items() if applies), *beaten, *left_out]
 
 
-def machines(rows: Sequence[Row]) -> list[str]:
-    """The machines that rows were measured on, and a warning if there are several."""
-    found = list({canonical(row.machine): row.machine for row in rows}.values())
+def machines(lines: pd.DataFrame) -> list[str]:
+    """The machines that episodes were measured on, and a warning if there are several."""
+    found = list(dict.fromkeys(itertools.chain(*lines.machines)))
     warning = ["The rows were measured on different machines: their times cannot be compared."]
-    return [f"machine: {_machine(one)}" for one in found] + warning * (len(found) > 1)
+    return [f"machine: {_machine(json.loads(one))}" for one in found] + warning * (len(found) > 1)
 
 
-def _machine(machine: Mapping[str, Any]) -> str:
-    words = dict(machine)
-    cpu, cores = words.pop("cpu", "unknown CPU"), words.pop("cores", "?")
-    return f"{cpu}, {cores} cores, " + ", ".join(f"{name} {value}" for name, value in words.items())
+def _machine(machine: dict[str, Any]) -> str:
+    cpu, cores = machine.pop("cpu", "unknown CPU"), machine.pop("cores", "?")
+    return f"{cpu}, {cores} cores, " + ", ".join(f"{name} {value}" for name, value in machine.items())

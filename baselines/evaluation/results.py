@@ -8,7 +8,7 @@ import io
 import pathlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,12 +35,18 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 #: The columns of results.csv, which are the keys of a row in results.json.
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 #: The report of a folder.
 PAGE = "report.html"
 #: Files of a folder that are replaced by --overwrite; other files are left alone.
-WRITTEN = ("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz")
+WRITTEN = (
+    *("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz"),
+    *("table.csv", "table.md", "cost-time-*.png", "foresight.png", "map.csv", "map.md", "map.png"),
+)
 
 
 class Rows(list[Row]):
@@ -53,6 +59,12 @@ class Rows(list[Row]):
     def __init__(self, rows: Iterable[Row] = (), skipped: Sequence[Skipped] = ()) -> None:
         super().__init__(rows)
         self.skipped = tuple(skipped)
+
+    def frame(self) -> pd.DataFrame:
+        """The rows as a data frame of pandas: one line an episode, NaN for None."""
+        from baselines.evaluation.summary import frame  # slow to import
+
+        return frame(self)
 
 
 class Results:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from baselines.evaluation import report
-from baselines.evaluation.jobs import Options, plan
+from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.play import run
 from baselines.evaluation.policies import ALL, AnyPolicy
@@ -40,7 +39,8 @@ def evaluate(
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.
         **options: Fields of :class:`baselines.evaluation.jobs.Options`: test_sets, episodes, split, steps, preview,
-            wrap, timed, workers, cluster, out, resume, overwrite, report, export, noise_seeds, pairs, progress.
+            wrap, timed, workers, cluster, out, resume, overwrite, report, export, noise_seeds, pairs, leaderboard,
+            severities, progress.
             More than one of `workers` needs a main module that may be imported, that is with
             ``if __name__ == "__main__":``.
 
@@ -85,18 +85,30 @@ def carry_out(
         if show is not None:
             show(out)
         if results is not None:
-            _finish(results, out, options, command)
+            _finish(results, out, jobs, options, command)
         return out
 
 
-def _finish(results: Results, rows: Rows, options: Options, command: str) -> None:
+def _finish(results: Results, rows: Rows, jobs: Sequence[Job], options: Options, command: str) -> None:
     """Writes tables and the report."""
+    from baselines.evaluation import report  # pandas is slow to import, and not needed before
+    from baselines.evaluation.summary import summarise
+
     results.save()
     results.save_csv()
-    now = datetime.datetime.now(datetime.UTC)
-    text = report.readme(results.rows, rows.skipped, command=command, date=now)
+    now, lines = datetime.datetime.now(datetime.UTC), summarise(results.rows)
+    text = report.readme(lines, rows.skipped, command=command, date=now)
     write(results.directory / "README.md", text.encode())
     if options.report:
         from baselines.evaluation.html.page import page
 
-        write(results.directory / PAGE, page(results, rows.skipped, command=command, date=now))
+        write(results.directory / PAGE, page(results, lines, rows.skipped, command=command, date=now))
+    if options.leaderboard or options.severities:
+        from baselines.evaluation.rankings import write_map, write_ranking
+
+        given = options.policies if isinstance(options.policies, (list, tuple)) else [options.policies]
+        names = [policy for policy in given if isinstance(policy, str)]
+        if options.leaderboard:
+            write_ranking(results.directory, rows, names)
+        if options.severities:
+            write_map(results.directory, rows, jobs, names)

@@ -1,184 +1,229 @@
-"""The episodes of a policy in a scenario as one record, which is a line of all tables of results."""
+"""Rows as data frames: one line an episode, and one line a policy in a scenario, which is a line of all tables."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
-import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from baselines import registry
-from baselines.canonical import canonical
+from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import Row
+from baselines.oracle import best_known
+from baselines.spec import parse_policy
 from baselines.statistics import geometric_interval, geometric_mean
 from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError
-from ikgym.scenarios.preview import furthest
-from ikgym.validation import FloatArray
 
-#: One line of a table: the name of each column and its value. Names end with the unit, such as `time_p50_us`.
-Record = Mapping[str, Any]
 #: The quantities by which the episodes of a scenario are compared.
 RATIO, TOTAL = "cost ratio", "total cost"
+#: Cost ratios where best known costs are missing: relative to the lowest cost in the table.
+LOWEST = "lowest in the table"
+BEST_KNOWN = "best known"
+#: Columns of rows that are numbers or None.
+_NUMBERS = [field.name for field in dataclasses.fields(Row) if str(field.type).startswith(("float", "int | None"))]
+#: What identifies a policy with its parameters, and a line of a table.
+_POLICY = ["policy", "text", "steps"]
+_LINE = ["scenario", "label", "text", "steps"]
 
 
-def grouped(rows: Iterable[Row]) -> dict[tuple[str, str, str, int], list[Row]]:
-    """The rows of each policy with its parameters in each scenario, in the order of their first rows.
+def frame(rows: Iterable[Row]) -> pd.DataFrame:
+    """One line an episode: the columns of :class:`baselines.evaluation.metrics.Row` and `lost`; NaN for None."""
+    rows = list(rows)
+    columns = [field.name for field in dataclasses.fields(Row)]
+    out = pd.DataFrame([vars(row) for row in rows], columns=columns).astype(dict.fromkeys(_NUMBERS, float))
+    return out.assign(lost=[row.lost for row in rows])
+
+
+def summarise(rows: Iterable[Row]) -> pd.DataFrame:
+    """One line for each policy with its parameters in each scenario, in the order of their first rows.
+
+    Returns:
+        What the columns of tables show, see :data:`baselines.evaluation.table.COLUMNS`: geometric means of costs,
+        largest errors, sums of steps and misses. `label` names the policy; `quantity` is what episodes are compared by:
+        the cost ratio if all of the scenario are known. Its geometric `mean` over the episodes has an interval from
+        `low` to `high`. `times_ideal` is the geometric mean of the cost divided by that of the same seed on an ideal
+        plant, with its interval. Of the first row there are `seed`, `fingerprint` and `parameters`.
 
     Raises:
         InvalidInputError: Two scenarios share a name, or rows belong to different test sets.
     """
-    groups: dict[tuple[str, str, str, int], list[Row]] = {}
-    contents: dict[str, tuple[str, str | None]] = {}
-    for row in rows:
-        content = row.fingerprint, row.test_set
-        if contents.setdefault(row.scenario, content) != content:
-            raise InvalidInputError(
-                f"The results of {row.scenario!r} cannot be put together: fingerprint and test set are "
-                f"{contents[row.scenario]} and {content}."
-            )
-        groups.setdefault((row.scenario, row.policy, canonical(row.parameters), row.steps), []).append(row)
-    return groups
+    episodes = _labelled(rows)
+    known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
+    episodes["value"] = episodes.cost_ratio.where(known, episodes.total_cost)
+    lines = _lines(episodes, _LINE)
+    lines.loc[lines.episodes == 1, ["low", "high"]] = np.nan
+    all_known = lines.groupby("scenario").unknown.transform("sum") == 0
+    lines["quantity"] = np.where(all_known, RATIO, TOTAL)
+    lines = lines.assign(ratio_low=lines.low.where(all_known), ratio_worst=lines.worst.where(all_known))
+    return lines.merge(_beside_ideal(episodes), how="left", on=_LINE)
 
 
-def summarise(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """One record for each group of rows, see :func:`grouped` and :func:`record`.
+def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
+    """One line for each policy in each scenario, sorted by cost ratio: the columns of :func:`summarise`.
 
-    Besides: `quantity`, by which the episodes are compared: it is the cost ratio if all of the scenario are known;
-    `cost_ratio` of the policy, None if it is not known; `ideal_cost_ratio`, its cost ratio on an ideal plant; and
-    `times_ideal`, the geometric mean of its cost divided by that of the same seed there, with its interval.
-    """
-    groups = grouped(rows)
-    unknown = {row.scenario for group in groups.values() for row in group if row.cost_ratio is None}
-    ideal = {
-        (group[0].fingerprint, *key[1:]): group
-        for key, group in groups.items()
-        if group[0].fingerprint == group[0].ideal
-    }
-    out = []
-    for (key, group), label in zip(groups.items(), labels([group[0] for group in groups.values()]), strict=True):
-        first, values = group[0], by_seed(group, _total if key[0] in unknown else _ratio)
-        known = all(row.cost_ratio is not None for row in group)
-        plain = [] if first.fingerprint == first.ideal else ideal.get((str(first.ideal), *key[1:]), [])
-        out.append(
-            record(label, group, np.array([list(values.values())]))
-            | ({} if len(values) > 1 else {"low": None, "high": None})
-            | {"quantity": TOTAL if key[0] in unknown else RATIO}
-            | {"cost_ratio": geometric_mean([*map(_ratio, group)]) if known else None}
-            | _beside_ideal(group, plain)
-        )
-    return out
-
-
-def record(label: str, rows: Sequence[Row], values: FloatArray) -> dict[str, Any]:
-    """The record of a policy in a scenario.
+    Agents whose files lie in ``DIR/seed-N/`` are training seeds of one agent, which is called DIR. `cost_ratio` and
+    its interval are `relative_to` best known costs; if one of the scenario is missing, to the lowest cost in the table.
 
     Args:
-        label: Name of the policy.
-        rows: Its rows.
-        values: The cost ratio or the total cost of each episode, one row per training seed. Shape (s, e).
+        rows: Results of an evaluation.
+        policies: The policies that were evaluated, as text; each is the label of its line. Others are called by their
+            name and the parameters that are not at their defaults.
 
-    Returns:
-        Spread of the values: geometric `mean` with its interval `low` to `high`, None if it has none, `median`, `p90`,
-        `worst` and `worst_seed`; means of costs, largest errors, sums of steps and misses; `first`, the first row.
+    Raises:
+        InvalidInputError: The training seeds of an agent have played different episodes.
     """
-    first, seeds = rows[0], list(dict.fromkeys(row.seed for row in rows))
+    episodes = _labelled(rows)
+    given = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
+    episodes["label"] = [_label(line, given) or line.label for line in episodes.itertuples()]
+    known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
+    # Costs too small for a ratio count as the smallest allowed.
+    lowest = episodes.groupby(["scenario", "seed"]).total_cost.transform("min").clip(lower=best_known.MEANINGLESS)
+    episodes["value"] = episodes.cost_ratio.where(known, episodes.total_cost / lowest)
+    lines = _lines(episodes, ["scenario", "label"])
+    lines["relative_to"] = np.where(lines.groupby("scenario").unknown.transform("sum") == 0, BEST_KNOWN, LOWEST)
+    lines["cost_ratio"] = lines["mean"]
+    places = {name: place for place, name in enumerate(lines.scenario.unique())}
+    return lines.sort_values(
+        ["scenario", "cost_ratio"], key=lambda values: values.map(places) if values.name == "scenario" else values
+    ).reset_index(drop=True)
+
+
+def _labelled(rows: Iterable[Row]) -> pd.DataFrame:
+    """The frame of rows; also the parameters as `text`, a `label` for the policy, and seeds that beat a record."""
+    rows = list(rows)
+    out = frame(rows).assign(
+        text=[canonical(row.parameters) for row in rows],
+        beaten=[row.seed if best_known.beaten(row) else np.nan for row in rows],
+    )
+    for scenario, contents in out.groupby("scenario", sort=False)[["fingerprint", "test_set"]]:
+        if len(different := contents.drop_duplicates()) > 1:
+            one, other, *_ = different.itertuples(index=False, name=None)
+            raise InvalidInputError(
+                f"The results of {scenario!r} cannot be put together: fingerprint and test set are {one} and {other}."
+            )
+    first = out.drop_duplicates(["scenario", *_POLICY])
+    named = first.assign(label=labels(first))[["scenario", *_POLICY, "label"]]
+    return out.merge(named, on=["scenario", *_POLICY])
+
+
+def _largest(values: pd.Series) -> float:
+    """The largest value; NaN if one is NaN, as that of an arm that diverged."""
+    return float(values.max(skipna=False))
+
+
+#: Each column of a line, the column of episodes that it is made of, and how.
+_COLUMNS: Mapping[str, tuple[str, Any]] = {
+    "policy": ("policy", "first"),
+    "parameters": ("parameters", "first"),
+    "steps": ("steps", "first"),
+    "fingerprint": ("fingerprint", "first"),
+    "first_seed": ("seed", "first"),
+    "machines": ("machine", lambda machines: tuple(map(json.dumps, machines))),
+    "beaten": ("beaten", lambda seeds: tuple(seeds.dropna().astype(int))),
+    "foresight": ("preview", "max"),
+    "seeds": ("text", "nunique"),
+    "episodes": ("seed", "nunique"),
+    "rows": ("seed", "size"),
+    "noisy": ("noise_seed", "any"),
+    "stated": ("acceleration_stated", "all"),
+    "unknown": ("cost_ratio", lambda ratios: ratios.isna().sum()),
+    "total_cost": ("total_cost", geometric_mean),
+    "tracking_cost": ("tracking_cost", geometric_mean),
+    "cost_ratio": ("cost_ratio", lambda ratios: geometric_mean(ratios) if ratios.notna().all() else np.nan),
+    "lost": ("lost", "sum"),
+    "followed": ("followed", "sum"),
+    "solver_status": ("solver_status", lambda statuses: max(statuses, key=lambda one: Status[one.upper()])),
+    "position_error": ("position_error_max", _largest),
+    "orientation_error": ("orientation_error_max", _largest),
+    "qdot_peak": ("qdot_peak", _largest),
+    "qddot_peak": ("qddot_peak", _largest),
+    **{name: (name, "sum") for name in (f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))},
+    "time_p50_us": ("time_p50_us", "median"),
+    "time_p99_us": ("time_p99_us", "max"),
+    "deadline_misses": ("deadline_misses", lambda misses: misses.sum(min_count=1)),
+    "path_time_s": ("path_time", _largest),
+    "path_error": ("path_position_error", "max"),
+    "stopped": ("stopped", "count"),
+    "clearance": ("clearance_min", "min"),
+}
+
+
+def _lines(episodes: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """One line for each group of episodes: :data:`_COLUMNS`, and the spread of the values over the episodes."""
+    groups = episodes.groupby(keys, sort=False)
+    lines = groups.agg(**{name: how for name, how in _COLUMNS.items() if name not in keys})
+    spread = pd.DataFrame([_spread(label, group) for label, group in groups], index=lines.index)
+    lines = lines.join(spread).reset_index()
+    collides = lines.clearance.notna()
+    return lines.assign(
+        reference=[is_reference(policy) for policy in lines.policy],
+        free_timing=lines.path_error.notna(),
+        lost_percent=100.0 * lines.lost / lines.rows,
+        position_error_mm=1e3 * lines.position_error,
+        orientation_error_mrad=1e3 * lines.orientation_error,
+        path_error_mm=1e3 * lines.path_error,
+        stopped=lines.stopped.where(collides),
+        stopped_percent=(100.0 * lines.stopped / lines.rows).where(collides),
+        clearance_mm=1e3 * lines.clearance,
+    )
+
+
+def _spread(key: tuple[Any, ...], rows: pd.DataFrame) -> dict[str, Any]:
+    """Geometric mean of the values with its interval, and their quantiles.
+
+    The value of an episode is the geometric mean over its noise seeds.
+    """
+    by_seed = [
+        some.groupby("seed", sort=False).value.agg(geometric_mean) for _, some in rows.groupby("text", sort=False)
+    ]
+    seeds = by_seed[0].index
+    if any(list(one.index) != list(seeds) for one in by_seed):
+        raise InvalidInputError(f"{key[1]}: expected the same episodes of all training seeds.")
+    values = np.array(by_seed)
     usable = values.min() > 0.0 and np.isfinite(values).all()
-    low, high = geometric_interval(values) if usable else (None, None)
-
-    def of(column: str) -> list[Any]:
-        return [value for row in rows if (value := getattr(row, column)) is not None]
-
-    def largest(column: str, scale: float = 1.0) -> float | None:
-        return max((scale * value for value in of(column)), default=None)
-
-    times, lost = of("time_p50_us"), sum(row.lost for row in rows)
-    colliding, free = first.clearance_min is not None, first.path_position_error is not None
+    low, high = geometric_interval(values) if usable else (np.nan, np.nan)
     return {
-        "policy": label,
-        "scenario": first.scenario,
-        "first": first,
-        "reference": is_reference(first.policy),
-        "steps": first.steps,
-        "foresight": max(furthest(row.preview) for row in rows),
-        "seeds": len(values),
-        "episodes": values.shape[1],
-        "rows": len(rows),
-        "total_cost": geometric_mean(of("total_cost")),
-        "tracking_cost": geometric_mean(of("tracking_cost")),
         "mean": geometric_mean(values),
         "low": low,
         "high": high,
-        "median": statistics.median(np.ravel(values).tolist()),
+        "median": float(np.median(values)),
         "p90": float(np.percentile(values, 90)),
         "worst": float(values.max()),
         "worst_seed": seeds[int(values.max(axis=0).argmax())],
-        "lost": lost,
-        "lost_percent": 100.0 * lost / len(rows),
-        "followed": sum(row.followed for row in rows),
-        "solver_status": max(of("solver_status"), key=lambda status: Status[status.upper()]),
-        "position_error_mm": largest("position_error_max", 1e3),
-        "orientation_error_mrad": largest("orientation_error_max", 1e3),
-        "qdot_peak": largest("qdot_peak"),
-        "qddot_peak": largest("qddot_peak"),
-        **{
-            f"steps_at_{kind}_limit": sum(of(f"steps_at_{kind}_limit"))
-            for kind in ("joint", "velocity", "acceleration")
-        },
-        "time_p50_us": statistics.median(times) if times else None,
-        "time_p99_us": largest("time_p99_us"),
-        "deadline_misses": sum(of("deadline_misses")) if times else None,
-        "free_timing": free,
-        "path_time_s": largest("path_time") if len(of("path_time")) == len(rows) else None,
-        "path_error_mm": largest("path_position_error", 1e3) if free else None,
-        "stopped": len(of("stopped")) if colliding else None,
-        "stopped_percent": 100.0 * len(of("stopped")) / len(rows) if colliding else None,
-        "clearance_mm": 1e3 * min(of("clearance_min")) if colliding else None,
     }
 
 
-def _beside_ideal(rows: Sequence[Row], plain: Sequence[Row]) -> dict[str, float | None]:
-    """The comparison with the rows of the same policy on an ideal plant."""
-    costs, there = by_seed(rows, _total), by_seed(plain, _total)
-    common = [seed for seed in costs if seed in there]
-    if not common or min(min(there[seed], costs[seed]) for seed in common) <= 0.0:
-        return dict.fromkeys(("ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"))
-    factors = [costs[seed] / there[seed] for seed in common]
-    known = [row.cost_ratio for row in plain if row.seed in costs and row.cost_ratio is not None]
-    low, high = geometric_interval(factors)
-    return {
-        "ideal_cost_ratio": geometric_mean(known) if len(known) == len(common) else None,
-        "times_ideal": geometric_mean(factors),
-        "times_ideal_low": low,
-        "times_ideal_high": high,
-    }
-
-
-def _total(row: Row) -> float:
-    return row.total_cost
-
-
-def _ratio(row: Row) -> float:
-    return row.cost_ratio or 0.0
-
-
-def by_seed(rows: Iterable[Row], value: Callable[[Row], float]) -> dict[int, float]:
-    """A number of each episode: the geometric mean over its noise seeds, by its reset seed."""
-    found: dict[int, list[float]] = {}
-    for row in rows:
-        found.setdefault(row.seed, []).append(value(row))
-    return {seed: geometric_mean(values) for seed, values in found.items()}
-
-
-def by_scenario(rows: Iterable[Row]) -> dict[str, list[dict[str, Any]]]:
-    """The records of each scenario, in the order of the rows."""
-    out: dict[str, list[dict[str, Any]]] = {}
-    for one in summarise(rows):
-        out.setdefault(one["scenario"], []).append(one)
-    return out
+def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Each line compared with the same policy on an ideal plant, by the seeds of both."""
+    keys = [*_LINE, "policy", "fingerprint", "ideal", "seed"]
+    costs = (
+        episodes.groupby(keys, sort=False, dropna=False)
+        .agg(
+            cost=("total_cost", geometric_mean),
+            ideal_ratio=("cost_ratio", lambda ratios: geometric_mean(ratios) if ratios.notna().all() else np.nan),
+        )
+        .reset_index()
+    )
+    ideal = costs.fingerprint == costs.ideal
+    plain = costs[ideal].drop_duplicates(["fingerprint", *_POLICY, "seed"], keep="last")
+    pairs = costs[~ideal].merge(
+        plain, left_on=["ideal", *_POLICY, "seed"], right_on=["fingerprint", *_POLICY, "seed"], suffixes=("", "_plain")
+    )
+    out = []
+    for key, pair in pairs.groupby(_LINE, sort=False):
+        if pair[["cost", "cost_plain"]].to_numpy().min() <= 0.0:
+            continue
+        factors, ratios = (pair.cost / pair.cost_plain).to_numpy(), pair.ideal_ratio_plain
+        ratio = geometric_mean(ratios) if ratios.notna().all() else np.nan
+        out.append((*key, ratio, geometric_mean(factors), *geometric_interval(factors)))
+    return pd.DataFrame(out, columns=[*_LINE, "ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"])
 
 
 def is_reference(policy: str) -> bool:
@@ -190,29 +235,29 @@ def is_reference(policy: str) -> bool:
     return bool(getattr(kind, "reference", False))
 
 
-def labels(rows: Sequence[Row]) -> list[str]:
-    """A label for the policy of each row.
+def labels(lines: pd.DataFrame) -> list[str]:
+    """A label for the policy of each line.
 
     The name, and the parameters that are not at their defaults; if that leaves two policies of a scenario alike, all
     parameters in which they differ.
     """
 
-    def label(row: Row, variants: Sequence[Row]) -> str:
-        defaults = _defaults(row.policy)
+    def label(policy: str, parameters: Mapping[str, Any], variants: Sequence[Mapping[str, Any]]) -> str:
+        defaults = _defaults(policy)
         parts = [
             f"{name}={f'{value:g}' if isinstance(value, float) else str(value).replace(' ', '')}"
-            for name, value in row.parameters.items()
-            if any(variant.parameters.get(name) != value for variant in variants) or defaults.get(name, value) != value
+            for name, value in parameters.items()
+            if any(variant.get(name) != value for variant in variants) or defaults.get(name, value) != value
         ]
-        return row.policy + (f":{','.join(parts)}" if parts else "")
+        return policy + (f":{','.join(parts)}" if parts else "")
 
-    short = [(row.scenario, label(row, ())) for row in rows]
-    taken = collections.Counter(short)
+    alike: dict[tuple[str, str], list[Any]] = collections.defaultdict(list)
+    short = [(line.scenario, label(line.policy, line.parameters, ())) for line in lines.itertuples()]
+    for name, parameters in zip(short, lines.parameters, strict=True):
+        alike[name].append(parameters)
     return [
-        label(row, [other for other, name in zip(rows, short, strict=True) if name == mine])
-        if taken[mine] > 1
-        else mine[1]
-        for row, mine in zip(rows, short, strict=True)
+        label(line.policy, line.parameters, alike[name] if len(alike[name]) > 1 else ())
+        for name, line in zip(short, lines.itertuples(), strict=True)
     ]
 
 
@@ -223,3 +268,22 @@ def _defaults(policy: str) -> dict[str, Any]:
         return {}
     # None often stands for a value that the policy works out itself.
     return {f.name: f.default for f in fields if f.default is not dataclasses.MISSING and f.default is not None}
+
+
+def _label(line: Any, given: Mapping[str, tuple[str, dict[str, Any]]]) -> str | None:
+    """The folder of an agent's training seeds, or the policy as text that names most of the parameters; else None."""
+    if seed := re.search(r"([^/\\]+)[/\\]seed-\d+[/\\]", str(line.parameters.get("path", ""))):
+        return seed[1]
+    alike = {
+        text: len(parameters)
+        for text, (name, parameters) in given.items()
+        if name == line.policy and _has(line.parameters, jsonable(parameters))
+    }
+    return max(alike, key=alike.__getitem__, default=None)
+
+
+def _has(there: Any, given: Any) -> bool:
+    """Whether a value is the given one; of tables, such as the options of an inner policy, the given keys count."""
+    if isinstance(there, Mapping) and isinstance(given, Mapping):
+        return all(key in there and _has(there[key], value) for key, value in given.items())
+    return canonical(there) == canonical(given)

@@ -1,19 +1,40 @@
-"""Tables of records as plain text and HTML, and numbers and names as text."""
+"""Tables as plain text, HTML, Markdown and CSV, and numbers and names as text."""
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import io
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
+from typing import TYPE_CHECKING, Any
 
-from baselines.evaluation.summary import Record
+from baselines.files import csv_text
+from ikgym.exceptions import InvalidInputError
+
+if TYPE_CHECKING:  # slow to import, and not needed for numbers and names
+    import pandas as pd
 
 #: The text of a cell without a value, and its value for sorting.
 NOTHING, LAST = "–", 1e300
 #: Longest name of a policy in a line of a plain table; longer ones have a line of their own.
 LONGEST = 20
+#: Suffixes of columns and the units in the heads.
+UNITS = {
+    "us": "µs",
+    "um": "µm",
+    "ms": "ms",
+    "s": "s",
+    "mm": "mm",
+    "mrad": "mrad",
+    "rad": "rad",
+    "deg": "°",
+    "percent": "%",
+}
+#: Columns that Markdown sets as code.
+CODE = ("policy", "scenario", "agent", "solver", "beside")
 
 
 def number(value: float | None) -> str:
@@ -27,72 +48,73 @@ def number(value: float | None) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
 
 
+def count(value: float) -> str:
+    """A whole number; a dash for none."""
+    return NOTHING if math.isnan(value) else f"{value:.0f}"
+
+
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """A column of a table of records."""
+    """A column of a table, see :func:`baselines.evaluation.summary.summarise`."""
 
+    key: str  # the name of its values
     title: str  # its head
-    unit: str  # the second line of the head
-    name: str  # what records call its value: a float, an integer, a text, or None
+    unit: str = ""  # the second line of the head
     about: str = ""  # a description, shown in HTML when the pointer is on the head
+    format: Callable[[Any], str] = number  # the text of a value
     drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
-    text: Callable[[Record], str] | None = None  # the text of a cell, if it is not that of its value
+    text: Callable[[Any], str] | None = None  # the text of the cell of a line, if it is not that of its value
 
     @property
     def head(self) -> str:
         """The head in one line."""
         return f"{self.title} {self.unit}".strip()
 
-    def cell(self, line: Record) -> str:
-        """The text of a cell."""
+    def cells(self, lines: pd.DataFrame) -> list[str]:
+        """The texts of the column."""
         if self.text is not None:
-            return self.text(line)
-        value = line[self.name]
-        return str(value) if isinstance(value, (int, str)) else number(value)
-
-    def left(self, line: Record) -> bool:
-        """Whether cells are aligned to the left, as text is."""
-        return isinstance(line[self.name], str)
+            return [self.text(line) for line in lines.itertuples()]
+        return [self.format(value) for value in lines[self.key]]
 
 
-def fitting(columns: Sequence[Column], lines: Sequence[Record], width: int) -> list[Column]:
-    """The columns that fit a line."""
-    kept = filled(columns, lines)
-    for column in sorted(kept, key=lambda column: -column.drop):
-        rule = next(line for line in plain(kept, lines, 0).splitlines() if set(line) == {"-"})
-        if not column.drop or len(rule) <= width:
+def interval(low: float, high: float) -> str:
+    """An interval: ``1.000 … 2.000``; a dash for none."""
+    return NOTHING if math.isnan(low) else f"{number(low)} … {number(high)}"
+
+
+def plain(chosen: Sequence[Column], lines: pd.DataFrame, width: int) -> tuple[str, list[Column]]:
+    """A table as plain text: policies first, columns closer together if they would not fit.
+
+    Returns:
+        The text, and columns that are left out since even then they do not fit.
+    """
+    kept, cells = list(chosen), {column.key: column.cells(lines) for column in chosen}
+    for column in sorted(chosen, key=lambda column: -column.drop):
+        sizes = [_size(column, cells[column.key]) for column in kept]
+        if not column.drop or sum(sizes) + len(sizes) - 1 <= width:
             break
         kept.remove(column)
-    return kept
+    gap = "  " if sum(sizes) + 2 * (len(sizes) - 1) <= width else " "
 
-
-def filled(columns: Iterable[Column], lines: Sequence[Record]) -> list[Column]:
-    """The columns that have a value in some line."""
-    return [column for column in columns if any(column.cell(one) != NOTHING for one in lines)]
-
-
-def plain(columns: Sequence[Column], lines: Sequence[Record], width: int) -> str:
-    """A table as plain text: policies first, columns closer together if they would not fit, empty ones left out."""
-    columns = filled(columns, lines)
-    heads = [[column.title for column in columns], [column.unit for column in columns]]
-    heads, body = heads[: 1 + any(heads[1])], [[column.cell(one) for column in columns] for one in lines]
-    sizes = [max(_width(line[i]) for line in [*heads, *body]) for i in range(len(columns))]
-    sizes[0] = max(size for line in [*heads, *body] if (size := _width(line[0])) <= LONGEST)
-    gap = "  " if sum(sizes) + 2 * (len(columns) - 1) <= width else " "
-    left = [column.left(lines[0]) for column in columns]
-
-    def padded(line: Sequence[str]) -> str:
+    def joined(line: Sequence[str], left: Sequence[bool]) -> str:
         blanks = [" " * (size - _width(text)) for text, size in zip(line, sizes, strict=True)]
-        cells = [
-            text + blank if leftwards else blank + text
-            for text, blank, leftwards in zip(line, blanks, left, strict=True)
-        ]
+        padded = [a + b if leftwards else b + a for a, b, leftwards in zip(line, blanks, left, strict=True)]
         if _width(line[0]) > LONGEST:
-            cells[0] = f"{line[0]}\n{' ' * sizes[0]}"
-        return gap.join(cells).rstrip()
+            padded[0] = f"{line[0]}\n{' ' * sizes[0]}"
+        return gap.join(padded).rstrip()
 
-    rule = "-" * (sum(sizes) + len(gap) * (len(columns) - 1))
-    return "\n".join([*map(padded, heads), rule, *map(padded, body)])
+    left = [column.format is str for column in kept]
+    heads = [[column.title for column in kept], [column.unit for column in kept]]
+    body = zip(*(cells[column.key] for column in kept), strict=True)
+    rule = "-" * (sum(sizes) + len(gap) * (len(sizes) - 1))
+    out = [joined(line, left) for line in heads[: 1 + any(heads[1])]] + [rule] + [joined(line, left) for line in body]
+    return "\n".join(out), [column for column in chosen if column not in kept]
+
+
+def _size(column: Column, cells: Iterable[str]) -> int:
+    """The width of a column; long names of policies have a line of their own."""
+    most = LONGEST if column.key == "label" else math.inf
+    return max(size for text in (column.title, column.unit, *cells) if (size := _width(text)) <= most)
 
 
 def _width(text: str) -> int:
@@ -100,30 +122,105 @@ def _width(text: str) -> int:
     return len(text) - text.count("\u0307")
 
 
-def html(columns: Sequence[Column], lines: Sequence[Record]) -> str:
+def html(chosen: Sequence[Column], lines: pd.DataFrame) -> str:
     """A table as HTML, complete without scripts; the value of a line's checkbox is its number."""
-    columns = filled(columns, lines)
     heads = [("policy", "* has privileged information, ‡ free timing"), ("scenario", "name of the scenario")]
-    heads += [(column.head, column.about) for column in columns]
+    heads += [(column.head, column.about) for column in chosen]
     out = ['<table id="results"><thead><tr><th class="pick" scope="col" aria-label="in the plots"></th>']
     out += [f'<th scope="col" title="{escape(about)}">{escape(title)}</th>' for title, about in heads]
     out.append("</tr></thead><tbody>")
-    for place, line in enumerate(lines):
-        name = escape(line["policy"] + " *" * line["reference"] + " ‡" * line["free_timing"])
-        scenario = escape(line["scenario"])
+    cells = [column.cells(lines) for column in chosen]
+    for place, line in enumerate(lines.itertuples(index=False)):
+        name = escape(line.label + " *" * line.reference + " ‡" * line.free_timing)
+        scenario = escape(line.scenario)
         out += [
             f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
             f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'
         ]
-        for column in columns:
-            value, text = line[column.name], escape(column.cell(line))
-            shown = text != NOTHING and isinstance(value, (int, float)) and math.isfinite(value)
-            order = value if shown else LAST
-            out.append(
-                f"<td>{text}</td>" if isinstance(value, str) else f'<td class="number" data-order="{order}">{text}</td>'
-            )
+        for column, texts in zip(chosen, cells, strict=True):
+            value, text = getattr(line, column.key), escape(texts[place])
+            if column.format is str:
+                out.append(f"<td>{text}</td>")
+            else:
+                order = value if text != NOTHING and math.isfinite(value) else LAST
+                out.append(f'<td class="number" data-order="{order}">{text}</td>')
         out.append("</tr>")
     return "".join([*out, "</tbody></table>"])
+
+
+def records(lines: pd.DataFrame | Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The lines of a frame, or lines as they are."""
+    return list(lines.to_dict("records") if hasattr(lines, "to_dict") else lines)
+
+
+def to_csv(lines: pd.DataFrame | Iterable[Mapping[str, Any]]) -> str:
+    """Lines as CSV: numbers with six significant digits, None and NaN as an empty cell."""
+    found = records(lines)
+    return csv_text(found[0], ([_plain(line[name]) for name in found[0]] for line in found))
+
+
+def from_csv(text: str) -> list[dict[str, str]]:
+    """The lines of a CSV file, all values as text."""
+    return list(csv.DictReader(io.StringIO(text, newline="")))
+
+
+def markdown(lines: pd.DataFrame | Iterable[Mapping[str, Any]], names: Sequence[str] = ()) -> str:
+    """Lines, or those of a CSV file, as a Markdown table with four significant digits, and units in the heads.
+
+    Names of columns end with the unit (`time_p50_us`). An interval is a pair of columns `low` and `high`, possibly with
+    a prefix; the column `low` shows it. All columns are shown if none is named.
+    """
+    found = records(lines)
+    names = [name for name in names or found[0] if not _ends(name, "high")]
+    if missing := [name for name in names if name not in found[0]]:
+        raise InvalidInputError(f"columns: expected some of {', '.join(found[0])}; got {', '.join(missing)}.")
+    cells = [[_cell(line, name) for name in names] for line in found]
+    text = [i for i, name in enumerate(names) if any(_value(line[name]) is None for line in found if line[name])]
+    return grid([_head(name) for name in names], cells, text=text)
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return None if math.isnan(value) else float(f"{value:.6g}")
+
+
+def _ends(name: str, end: str) -> bool:
+    return name == end or name.endswith(f"_{end}")
+
+
+def _head(name: str) -> str:
+    if _ends(name, "low"):
+        return "95 %"
+    words, _, unit = name.rpartition("_")
+    words, unit = (words, f" [{UNITS[unit]}]") if words and unit in UNITS else (name, "")
+    return words.replace("times_", "× ").replace("time_p", "p").replace("_", " ") + unit
+
+
+def _cell(line: Mapping[Any, Any], name: str) -> str:
+    value = line[name]
+    if value in ("", None) or value != value:
+        return NOTHING
+    if _ends(name, "low"):
+        return interval(float(value), float(line[name.removesuffix("low") + "high"]))
+    if name in CODE:
+        return code(str(value)).replace("|", "\\|")
+    found = _value(value)
+    if found is None:
+        return escaped(str(value))
+    if found.is_integer() and "." not in str(value):
+        return f"{found:,.0f}"
+    if name.endswith("_percent"):
+        return f"{found:.2g}" if found < 10.0 else f"{found:.0f}"
+    return f"{found:,.0f}" if name.endswith("_us") and found >= 10.0 else number(found)
+
+
+def _value(cell: Any) -> float | None:
+    """The number in a cell; None for text."""
+    try:
+        return float(cell)
+    except (TypeError, ValueError):
+        return None
 
 
 def escaped(text: str) -> str:

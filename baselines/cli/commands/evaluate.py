@@ -6,18 +6,18 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, ClassVar
+from collections.abc import Callable, Iterable
+from typing import Annotated
 
 import tyro
 
 from baselines import registry
 from baselines.cli import shell
 from baselines.cli.parsing import Rule, varies
-from baselines.evaluation import report, test_sets
+from baselines.evaluation import test_sets
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.results import PAGE
+from baselines.evaluation.results import PAGE, Rows
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
@@ -34,14 +34,10 @@ class Arguments(Options):
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
     one of your own, also of a module in the current folder, or: all."""
 
-    #: Played if neither scenarios nor test sets are given.
-    fallback: ClassVar[Mapping[str, tuple[str, ...]]] = {"scenarios": ("varga7-fast",)}
-
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.scenarios or self.test_sets):
-            for name, value in self.fallback.items():
-                object.__setattr__(self, name, value)
+            object.__setattr__(self, "scenarios", ("varga7-fast",))
 
     def played(self) -> list[Scenario]:
         """The scenarios, those of test sets included."""
@@ -56,15 +52,19 @@ def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
 #: Processes of this machine, or a cluster.
 ONE_KIND = Rule(("--workers",), lambda given: given.cluster is None, "with --cluster")
 RULES = (
-    Rule(("--resume", "--overwrite", "--report"), lambda given: given.out is not None, "without --out"),
     Rule(
-        ("--episodes", "--split", "--steps", "--noise-seeds"),
+        ("--resume", "--overwrite", "--report", "--leaderboard", "--severities"),
+        lambda given: given.out is not None,
+        "without --out",
+    ),
+    Rule(
+        ("--episodes", "--split", "--steps", "--noise-seeds", "--severities"),
         lambda given: not given.test_sets,
         "with --test-sets, which define the episodes",
     ),
     Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
     Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
-    Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    Rule(("--pairs", "--severities"), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
     Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
@@ -89,6 +89,8 @@ Examples:
   {prog} --scenarios varga7-random --episodes 50 --out results/random --resume
   {prog} --test-sets varga7-pose-random --policies rhc_gradient --out results/test
   {prog} --test-sets panda-camera --pairs --policies dls rhc told --out results/camera
+  {prog} --leaderboard --test-sets varga7-pose-random --timed 2 --policies dls qp rhc:horizon=100 --out results/pose
+  {prog} --scenarios panda-field --severities 0 0.5 1 --episodes 4 --policies qp rhc told --out results/map
   {prog} --scenarios varga7-random --policies agent:runs/mine.safetensors dls
   {prog} --scenarios lab.toml --policies qp --out results/lab --export csv joint-trajectory
   {prog} --scenarios lab.toml my_module:scenario --policies my_module:MyPolicy dls
@@ -100,6 +102,8 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   report.html   a table that sorts and filters, plots, and replays of the arms: open it in a browser
   series/       the data of the plots, as .npz
   export/       with --export, the joint motion of each episode
+  table.csv, table.md, cost-time-SCENARIO.png, foresight.png   with --leaderboard
+  map.csv, map.md, map.png                                     with --severities
 
 Columns:
 {_columns()}
@@ -124,15 +128,21 @@ def cut_off(played: Iterable[Scenario]) -> list[str]:
     ]
 
 
+def _show(rows: Rows) -> None:
+    """Prints the table."""
+    from baselines.evaluation import report  # pandas is slow to import, and not needed before
+    from baselines.evaluation.summary import summarise
+
+    print(report.table(summarise(rows), rows.skipped, width=shell.width()), flush=True)
+
+
 def _work(given: Arguments, command: str) -> None:
     for warning in cut_off(given.played()) if given.steps is None else ():
         print(warning, file=sys.stderr)
-    carry_out(
-        dataclasses.replace(given, progress=True),
-        command=command,
-        show=lambda rows: print(report.table(rows, rows.skipped, width=shell.width()), flush=True),
-    )
+    carry_out(dataclasses.replace(given, progress=True), command=command, show=_show)
     if given.out is not None:
+        for name in ["table.md"] * given.leaderboard + ["map.md"] * bool(given.severities):
+            print(f"\n{(given.out / name).read_text(encoding='utf-8')}", end="")
         print(f"\nwritten to {given.out}" + (f"; open {given.out / PAGE} in a browser" if given.report else ""))
 
 

@@ -20,7 +20,7 @@ from baselines.canonical import jsonable
 from baselines.cli import shell
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
-from baselines.evaluation.records import to_csv
+from baselines.evaluation.table import to_csv
 from baselines.files import locked, write
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper

@@ -12,12 +12,14 @@ import numpy as np
 from baselines import registry
 from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
+from baselines.evaluation.columns import COLUMNS as EVERY
+from baselines.evaluation.columns import ERRORS, TIMES
 from baselines.evaluation.compare.library_times import with_library_times
 from baselines.evaluation.compare.rule import PREFERRED, RULE, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import Column, fitting, plain
+from baselines.evaluation.table import Column, plain
 from baselines.paths import retime
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
@@ -42,18 +44,18 @@ class Comparison:
 
     def table(self, width: int = report.WIDTH) -> str:
         """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""
-        lines = [
-            {**line, "solver": solver_of(line["first"]), "follows": "no" if fault(line["first"], self.dt) else "yes"}
-            for line in summarise(self.rows)
-        ]
-        columns = fitting(COLUMNS, lines, width)
+        lines = summarise(self.rows).assign(  # one row a line
+            label=[solver_of(row) for row in self.rows],
+            follows=["no" if fault(row, self.dt) else "yes" for row in self.rows],
+        )
+        table, _ = plain(COLUMNS, lines, width)
         texts = [
             f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller",
             *[LIBRARY] * any(registry.get(row.policy).rival for row in self.rows),
         ]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes, RULE)]
         last = textwrap.fill(str(self.recommendation), width)
-        return "\n".join([plain(columns, lines, width), "", *below, "", last])
+        return "\n".join([table, "", *below, "", last])
 
 
 def solver_of(row: Row) -> str:
@@ -62,13 +64,13 @@ def solver_of(row: Row) -> str:
 
 
 COLUMNS = (
-    Column("solver", "", "solver"),
-    Column("path", "", "scenario"),
-    *report.ERRORS[:3],
-    dataclasses.replace(report.ERRORS[3], drop=0),  # decides
-    Column("at stop", "[steps]", "steps_at_joint_limit"),
-    *report.TIMES[:2],
-    Column("follows", "", "follows"),
+    Column("label", "solver", format=str),
+    Column("scenario", "path", format=str),
+    *(EVERY[key] for key in ERRORS[:3]),
+    dataclasses.replace(EVERY["qddot_peak"], drop=0),  # decides
+    dataclasses.replace(EVERY["steps_at_joint_limit"], unit="[steps]"),
+    *(EVERY[key] for key in TIMES[:2]),
+    Column("follows", "follows", format=str),
 )
 
 

@@ -11,54 +11,37 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
+import pandas as pd
+
 from baselines.evaluation import report
+from baselines.evaluation.columns import REPORT, columns
 from baselines.evaluation.html.series import BUDGET, thinned
 from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.results import Results
-from baselines.evaluation.summary import RATIO, Record, by_scenario
-from baselines.evaluation.table import NOTHING, Column, html, number
+from baselines.evaluation.table import html
 
 #: A placeholder in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
 
 
-COLUMNS = (
-    report.RATIO,
-    Column(
-        *("95 %", "", "low", "interval of the mean cost ratio over the episodes"),
-        text=lambda line: report.interval(line) if line["quantity"] == RATIO else NOTHING,
-    ),
-    Column(
-        *("worst", "", "worst", "largest cost ratio of an episode"),
-        text=lambda line: number(line["worst"] if line["quantity"] == RATIO else None),
-    ),
-    report.TOTAL,
-    *report.ERRORS,
-    Column("at stop", "", "steps_at_joint_limit", "steps with a joint at a stop"),
-    Column("at q̇ limit", "", "steps_at_velocity_limit", "steps with a joint at its velocity limit"),
-    Column("at q̈ limit", "", "steps_at_acceleration_limit", "steps with a joint at its acceleration limit"),
-    *(*report.PATH, *report.CONTACTS, *report.TIMES, report.EPISODES, report.LOST, report.FOLLOWED, report.STATUS),
-)
-
-
-def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> bytes:
-    """The report of a folder of results."""
+def page(
+    results: Results, lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime
+) -> bytes:
+    """The report of a folder of results, whose rows are summarised in lines."""
     from plotly.offline import get_plotlyjs  # slow to import, and not needed for rows
 
-    rows = results.rows
-    shown = [line for lines in by_scenario(rows).values() for line in lines]
-    scenarios = list(dict.fromkeys(line["scenario"] for line in shown))
-    numbers = {"scenarios": len(scenarios), "policies": len({one["policy"] for one in shown}), "episodes": len(rows)}
+    scenarios = lines.scenario.unique().tolist()
+    numbers = {"scenarios": len(scenarios), "policies": lines.label.nunique(), "episodes": lines.rows.sum()}
     parts = {
         "style": _file("page.css"),
         "title": escape(", ".join(scenarios[:2]) + " …" * (len(scenarios) > 2)),
         "scenarios": escape(", ".join(scenarios)),
         "subtitle": f"{', '.join(f'{name}: {n}' for name, n in numbers.items())}; {date:%Y-%m-%d %H:%M} UTC",
-        "table": html(COLUMNS, shown),
-        "notes": _items(report.remarks(rows, skipped)),
-        "conditions": _items([f"command: {command}", *report.machines(rows)]),
-        "parameters": _items(report.parameters(shown)),
-        "data": embedded(data(results, shown)),
+        "table": html(columns(REPORT, lines), lines),
+        "notes": _items(report.remarks(lines, skipped)),
+        "conditions": _items([f"command: {command}", *report.machines(lines)]),
+        "parameters": _items(report.parameters(lines)),
+        "data": embedded(data(results, lines)),
         "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
         "script": _file("page.js"),
@@ -66,19 +49,23 @@ def page(results: Results, skipped: Sequence[Skipped] = (), *, command: str, dat
     return PLACE.sub(lambda found: parts[found[1]], _file("template.html")).encode()
 
 
-def data(results: Results, lines: Sequence[Record]) -> list[dict[str, Any]]:
+def data(results: Results, lines: pd.DataFrame) -> list[dict[str, Any]]:
     """The data of the plots: costs, times and the thinned trajectory log of each line of the table."""
-    logged = [line for line in lines if results.series_file(line["first"]).exists()]
+    logged = [results.series_file(line).exists() for line in lines.itertuples()]
     return [
         {
-            **{name: line[name] for name in ("scenario", "policy", "reference", "quantity", "low", "high")},
-            "value": line["mean"] if math.isfinite(line["mean"]) else None,
-            "time": line["time_p50_us"],
-            "seed": line["first"].seed,
-            "series": thinned(results.series(line["first"]), BUDGET // len(logged)) if line in logged else None,
+            **{"scenario": line.scenario, "policy": line.label, "reference": line.reference, "quantity": line.quantity},
+            **{"low": _finite(line.low), "high": _finite(line.high), "value": _finite(line.mean)},
+            "time": _finite(line.time_p50_us),
+            "seed": line.first_seed,
+            "series": thinned(results.series(line), BUDGET // sum(logged)) if there else None,
         }
-        for line in lines
+        for line, there in zip(lines.itertuples(), logged, strict=True)
     ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def embedded(content: Any) -> str:

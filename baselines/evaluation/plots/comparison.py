@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from baselines.evaluation.plots import style
-from baselines.evaluation.records import Record
 from baselines.evaluation.table import number
 
 #: Excess costs below this are drawn here, in [%].
@@ -23,6 +23,8 @@ FLOOR = 0.01
 CUT = 100.0
 #: Values within the first factor have several ticks a decade, within the second evenly spaced ones.
 CLOSE, EVEN = 300.0, 4.0
+#: One line of a table: the name of each column and its value, or the text of it.
+Record = Mapping[str, Any]
 
 
 def front(lines: Sequence[Record]) -> list[Record]:
@@ -40,7 +42,12 @@ def front(lines: Sequence[Record]) -> list[Record]:
 
 
 def _timed(line: Record) -> bool:
-    return line["time_p99_us"] not in ("", None) and np.isfinite(float(line["cost_ratio"]))
+    return math.isfinite(_number(line["time_p99_us"])) and math.isfinite(_number(line["cost_ratio"]))
+
+
+def _number(cell: object) -> float:
+    """The number in a cell; NaN in an empty one."""
+    return math.nan if cell in ("", None) else float(str(cell))
 
 
 def cost_time(lines: Sequence[Record], title: str) -> Figure:
@@ -152,11 +159,12 @@ def _logarithmic(axes: Axes) -> None:
 
 def _excess(cost_ratio: object) -> float:
     """The cost above the reference, in [%]."""
-    return max(100.0 * (float(str(cost_ratio)) - 1.0), FLOOR)
+    return max(100.0 * (_number(cost_ratio) - 1.0), FLOOR)
 
 
 def _interval(axes: Axes, x: float, line: Record, **look: Any) -> Artist:
     """A point with the interval of its geometric mean."""
-    middle, low, high = (_excess(line[name] or line["cost_ratio"]) for name in ("cost_ratio", "low", "high"))
+    middle = _excess(line["cost_ratio"])
+    low, high = (middle if math.isnan(_number(line[name])) else _excess(line[name]) for name in ("low", "high"))
     lengths = [[middle - min(low, middle)], [max(high, middle) - middle]]
     return axes.errorbar([x], [middle], yerr=lengths, **look).lines[0]

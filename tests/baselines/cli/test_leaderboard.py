@@ -1,10 +1,11 @@
-"""The commands that compare policies: leaderboard and robustness."""
+"""The options of evaluate that compare policies: a ranked table, and a map over severities."""
 
 import csv
 
 import pytest
 
-from baselines.cli.commands import leaderboard, robustness
+from baselines.cli.commands.evaluate import main
+from baselines.evaluation.jobs import Options, at_severities, plan
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 
@@ -14,47 +15,43 @@ def lines_of(file):
         return list(csv.DictReader(text))
 
 
-def test_leaderboard_plays_and_resumes(tmp_path, capsys):
-    policies = ["dls", "broyden", "agent_alone"]
-    words = ["--scenarios", "zhang3-helix", "--policies", *policies, "--out", str(tmp_path), "--timed", "1"]
-    assert leaderboard.main(words) == 0
+def test_a_ranking_is_written_printed_and_resumed(tmp_path, capsys):
+    policies = ["broyden", "dls", "agent_alone"]
+    words = ["--leaderboard", "--scenarios", "zhang3-helix", "--policies", *policies, "--out", str(tmp_path)]
+    assert main(words) == 0
     printed = capsys.readouterr().out
     assert "skipped: agent_alone in zhang3-helix: " in printed
-    assert printed.endswith(f"written to {tmp_path}\n")
     lines = lines_of(tmp_path / "table.csv")
     assert [line["policy"] for line in lines] == ["dls", "broyden"]
-    assert all(f"`{line['policy']}`" in printed for line in lines)
-    assert {"table.md", "cost-time-zhang3-helix.png", "foresight.png", "results.json", "report.html"} <= {
+    assert (tmp_path / "table.md").read_text(encoding="utf-8") in printed
+    assert {"cost-time-zhang3-helix.png", "foresight.png", "results.json", "report.html"} <= {
         file.name for file in tmp_path.iterdir()
     }
-    assert leaderboard.main(words) == 2
-    assert "--resume" in capsys.readouterr().err
-    assert leaderboard.main([*words, "--resume"]) == 0
+    assert main([*words, "--resume"]) == 0
     assert lines_of(tmp_path / "table.csv") == lines
-
-
-def test_leaderboard_takes_test_sets_or_scenarios(tmp_path, capsys):
-    words = ["--scenarios", "varga7-fast", "--test-sets", "varga7-random", "--out", str(tmp_path)]
-    assert leaderboard.main(words) == 2
-    assert "expected --test-sets or --scenarios" in capsys.readouterr().err
+    assert main([*words[1:], "--overwrite"]) == 0
+    assert not (tmp_path / "table.csv").exists()
 
 
 @pytest.mark.slow
-def test_robustness_draws_a_map(tmp_path, capsys):
+def test_a_map_over_severities(tmp_path, capsys):
     short, out = tmp_path / "short.toml", str(tmp_path)
     scenarios.get("panda-field").replace(steps=300).save(short)
-    words = ["--scenario", str(short), "--policies", "dls", "--severities", "0", "1", "--episodes", "1", "--out", out]
-    assert robustness.main(words) == 0
+    assert main(["--scenarios", str(short), "--policies", "dls", "--severities", "0", "1", "--out", out]) == 0
     cells = {(line["knowledge"], line["drives"]): line for line in lines_of(tmp_path / "map.csv")}
     assert set(cells) == {(k, d) for k in ("0.0", "1.0") for d in ("0.0", "1.0")}
     ideal, worst = (float(cells[place]["cost_ratio"]) for place in (("0.0", "0.0"), ("1.0", "1.0")))
     assert 1.0 <= ideal < worst
     assert (tmp_path / "map.png").exists()
-    assert "× ideal" not in capsys.readouterr().out
+    assert (tmp_path / "map.md").read_text(encoding="utf-8") in capsys.readouterr().out
 
 
 def test_severities_scale_the_plant():
-    assert robustness.at("panda-field", 0.0, 0.0).plant.ideal
-    assert robustness.at("panda-bus", 0.5, 1.0).name == "panda-bus 0.5 1"
-    with pytest.raises(InvalidInputError, match="not ideal"):
-        robustness.at("varga7-fast", 1.0, 1.0)
+    field, bus = scenarios.get("panda-field"), scenarios.get("panda-bus")
+    first, *_, last = at_severities(field, (0.0, 1.0))
+    assert first.plant.ideal
+    assert last.plant == scenarios.imperfect.FIELD
+    assert at_severities(bus, (1, 0.5))[1].name == "panda-bus 0.5 1"
+    for given in ("varga7-fast", [field, bus]):
+        with pytest.raises(InvalidInputError, match="severities: expected one scenario whose plant is not ideal"):
+            plan(Options(scenarios=given, severities=(1.0,)))

@@ -14,9 +14,10 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.html.series import BUDGET, thinned
-from baselines.evaluation.records import markdown, records
+from baselines.evaluation.rankings import ranking
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
+from baselines.evaluation.table import markdown
 from baselines.recording import Seeds
 from ikgym.obstacles.solids import closest
 from tests.baselines.evaluation.html.test_series import decoded
@@ -79,16 +80,16 @@ def test_rows_are_read_again_also_those_of_before(rows):
 
 def test_tables_state_stops_where_there_can_be_any(rows):
     stopped, clear, free = rows[0]
-    assert [one["stopped"] for one in summarise(rows[0])] == [1, 0, None]
-    text = report.table([stopped, clear])
+    assert summarise(rows[0]).stopped.fillna(-1).tolist() == [1, 0, -1]
+    text = report.table(summarise([stopped, clear]))
     assert "clearance" in text
     assert "stopped: episodes in which they would have met" in " ".join(text.split())
-    assert "stopped" not in report.table([free])
-    first, second = records([stopped, clear])
-    assert (first["stopped_percent"], second["stopped_percent"]) == (100.0, 0.0)
-    assert second["clearance_mm"] == 1e3 * clear.clearance_min
-    assert "stopped [%]" in markdown([first, second])
-    assert "stopped_percent" not in records([free])[0]
+    assert "stopped" not in report.table(summarise([free]))
+    both = ranking([stopped, clear])
+    assert both.stopped_percent.tolist() == [100.0, 0.0]
+    assert both.clearance_mm[1] == 1e3 * clear.clearance_min
+    assert "stopped [%]" in markdown(both)
+    assert "stopped_percent" not in ranking([free])
 
 
 def test_a_wrapped_policy_is_measured_alike(rows):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.evaluation.motion.published_rule import verdict
-from baselines.evaluation.records import to_csv
+from baselines.evaluation.table import to_csv
 from docs import keeping, obstructed
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError

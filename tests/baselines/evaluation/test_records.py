@@ -1,15 +1,19 @@
-"""Comparisons of policies: records from rows, CSV and Markdown, intervals and plots."""
+"""Comparisons of policies: rankings from rows, CSV and Markdown, intervals and plots."""
 
 import dataclasses
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.stats
 
 from baselines.evaluate import evaluate
-from baselines.evaluation import records
+from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots import comparison
 from baselines.evaluation.plots.style import png
+from baselines.evaluation.rankings import ranking
+from baselines.evaluation.summary import BEST_KNOWN, LOWEST
+from baselines.evaluation.table import from_csv, markdown, to_csv
 from baselines.statistics import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
 
@@ -33,27 +37,27 @@ def agent(row, seed, cost_ratios):
     return episodes(row, cost_ratios, policy="agent", parameters=path)
 
 
-class TestRecords:
+class TestRanking:
     def test_one_line_per_policy_sorted_by_cost_ratio(self, row):
         rows = [*episodes(row, (4.0, 9.0)), *episodes(row, (1.0, 4.0), policy="qp", parameters={}, time_p99_us=7.0)]
-        first, second = records.records(rows)
-        assert (first["policy"], first["cost_ratio"], first["time_p99_us"]) == ("qp", pytest.approx(2.0), 7.0)
-        assert (second["cost_ratio"], second["worst"], second["p90"]) == (pytest.approx(6.0), 9.0, 8.5)
-        assert (second["episodes"], second["seeds"], second["relative_to"]) == (2, 1, records.BEST_KNOWN)
-        assert (second["low"], second["high"]) == geometric_interval((4.0, 9.0))
+        first, second = ranking(rows).itertuples()
+        assert (first.policy, first.cost_ratio, first.time_p99_us) == ("qp", pytest.approx(2.0), 7.0)
+        assert (second.cost_ratio, second.worst, second.p90) == (pytest.approx(6.0), 9.0, 8.5)
+        assert (second.episodes, second.seeds, second.relative_to) == (2, 1, BEST_KNOWN)
+        assert (second.low, second.high) == geometric_interval((4.0, 9.0))
 
     def test_training_seeds_share_a_line(self, row):
-        (line,) = records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))])
-        assert (line["policy"], line["seeds"], line["episodes"]) == ("apg", 2, 2)
-        assert line["cost_ratio"] == pytest.approx(2.0)
+        (line,) = ranking([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))]).itertuples()
+        assert (line.policy, line.seeds, line.episodes) == ("apg", 2, 2)
+        assert line.cost_ratio == pytest.approx(2.0)
         with pytest.raises(InvalidInputError, match="apg: expected the same episodes"):
-            records.records([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
+            ranking([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
 
     def test_without_best_known_costs_relative_to_the_lowest(self, row):
         rows = [*episodes(row, (2.0, 8.0)), *episodes(row, (4.0, 2.0), policy="qp", parameters={})]
-        lines = records.records([dataclasses.replace(one, cost_ratio=None) for one in rows])
-        assert [line["relative_to"] for line in lines] == [records.LOWEST] * 2
-        assert [line["cost_ratio"] for line in lines] == pytest.approx([np.sqrt(2.0), 2.0])
+        lines = ranking([dataclasses.replace(one, cost_ratio=None) for one in rows])
+        assert lines.relative_to.tolist() == [LOWEST] * 2
+        assert lines.cost_ratio.tolist() == pytest.approx([np.sqrt(2.0), 2.0])
 
     def test_labels_are_the_policies_as_given_with_the_options_of_inner_ones(self, row):
         given = ["rhc:horizon=3", "rhc:horizon=3,iterations=1", "smoothed:options={'horizon': 3}"]
@@ -64,7 +68,7 @@ class TestRecords:
         for cost, parameters in enumerate((plain, short, *inner), 2):
             policy = "smoothed" if "options" in parameters else "rhc"
             rows += episodes(row, (float(cost),), policy=policy, parameters=parameters)
-        assert [line["policy"] for line in records.records(rows, given)] == given
+        assert ranking(rows, given).policy.tolist() == given
 
 
 class TestFiles:
@@ -74,22 +78,32 @@ class TestFiles:
     )
 
     def test_csv_and_back(self):
-        lines = records.from_csv(records.to_csv(self.LINES))
+        lines = from_csv(to_csv(self.LINES))
         assert lines[0]["cost_ratio"] == "1.23457"
         assert lines[1]["low"] == ""
-        assert records.markdown(lines) == records.markdown(self.LINES)
+        assert markdown(lines) == markdown(self.LINES) == markdown(pd.DataFrame(self.LINES))
+        assert to_csv(pd.DataFrame(self.LINES)) == to_csv(self.LINES)
 
     def test_markdown(self):
-        assert records.markdown(self.LINES).splitlines() == [
+        assert markdown(self.LINES).splitlines() == [
             "| policy | n | cost ratio | 95 % | lost [%] |",
             "| :-- | --: | --: | --: | --: |",
             "| `a\\|b` | 1,200 | 1.235 | 1.000 … 2.000 | 0.5 |",
             "| `c` | 2 | 1.000e9 | – | 100 |",
         ]
 
-        assert records.markdown(self.LINES, ["n", "policy"]).startswith("| n | policy |")
+        assert markdown(self.LINES, ["n", "policy"]).startswith("| n | policy |")
         with pytest.raises(InvalidInputError, match="expected some of policy, n"):
-            records.markdown(self.LINES, ["m"])
+            markdown(self.LINES, ["m"])
+
+
+def test_rows_are_a_frame():
+    rows = evaluate("zhang3-helix", ["dls", "moore_penrose"], steps=3)
+    frame = rows.frame()
+    assert list(frame)[:-1] == [field.name for field in dataclasses.fields(Row)]
+    assert frame.total_cost.tolist() == [row.total_cost for row in rows]
+    assert frame.orientation_error_max.isna().all()
+    assert frame.lost.tolist() == [row.lost for row in rows]
 
 
 class TestInterval:

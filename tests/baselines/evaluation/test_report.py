@@ -34,6 +34,14 @@ REFERENCE = dataclasses.replace(BASE, policy="follow_nominal", parameters={}, tr
 DATE = datetime.datetime(2026, 1, 2, 3, 4, tzinfo=datetime.UTC)
 
 
+def table(rows, *arguments, **options):
+    return report.table(summarise(rows), *arguments, **options)
+
+
+def readme(rows, *arguments, **options):
+    return report.readme(summarise(rows), *arguments, **options)
+
+
 def row(**changes):
     return dataclasses.replace(BASE, **changes)
 
@@ -44,7 +52,7 @@ def test_numbers_have_four_digits():
 
 
 def test_table():
-    text = report.table([BASE, REFERENCE])
+    text = table([BASE, REFERENCE])
     lines = text.split("\n")
     assert lines[0] == "varga7-fast: 3000 steps"
     cells = "dls 1.423e7 301.2 1.416 16.88 13.31 500.0 16.21 28.79 1 no converged"
@@ -55,14 +63,14 @@ def test_table():
     assert "[mrad]" in lines[2]
     assert "episodes" not in text
     assert "cost ratio" not in text  # no cost is known
-    lines = report.table([dataclasses.replace(BASE, cost_ratio=2.0), REFERENCE]).split("\n")
+    lines = table([dataclasses.replace(BASE, cost_ratio=2.0), REFERENCE]).split("\n")
     assert [line.split()[-10] for line in lines[4:6]] == ["2.000", "–"]
 
 
 def test_joints_at_stops_and_peaks_without_a_stated_limit_are_marked():
     stopped = row(policy="moore_penrose", parameters={}, steps_at_joint_limit=3)
     unstated = row(policy="qp", scenario="own", acceleration_stated=False)
-    text = report.table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1), unstated])
+    text = table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1), unstated])
     assert [line.partition("1.423e7")[0].strip() for line in text.split("\n")[4:7]] == [
         "dls",
         "moore_penrose †",
@@ -72,7 +80,7 @@ def test_joints_at_stops_and_peaks_without_a_stated_limit_are_marked():
     assert re.search(r"^qp:damping=0.001 .* 500\.0 § ", text, re.MULTILINE)
     assert text.count("500.0 §") == 1
     assert report.STATED_NOTE in text
-    assert not {"†", "§"} & set(report.table([BASE, row(policy="moore_penrose", steps_at_velocity_limit=3)]))
+    assert not {"†", "§"} & set(table([BASE, row(policy="moore_penrose", steps_at_velocity_limit=3)]))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +106,7 @@ def test_several_episodes_are_put_together():
             (2_000_003, 1e6, 0.2, 6.0, "iteration_limit"),
         )
     ]  # fmt: skip
-    text = report.table(rows)
+    text = table(rows)
     assert text.startswith("varga7-random: 3 episodes of 3000 steps")
     cells = "dls 2154 301.2 200.0 16.88 13.31 500.0 6.000 14.00 6 2 of 3 rank_deficient"
     assert text.split("\n")[4].split() == cells.split()
@@ -113,13 +121,13 @@ def test_several_episodes_are_judged_by_their_cost_ratio_where_it_is_known():
         row(scenario="varga7-random", seed=seed, cost_ratio=cost_ratio, position_error_max=error)
         for seed, cost_ratio, error in ((7, 1.0, 0.0), (8, 4.0, 0.06), (9, 2.0, 0.0))
     ]
-    text = report.table(rows)
+    text = table(rows)
     assert "cost ratio over the episodes of varga7-random" in text
     assert "total cost over" not in text
     line = [line for line in text.split("\n") if line.startswith("dls")][-1]
     assert re.split(r"\s{2,}", line) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8", "1"]
     assert re.split(r"\s{2,}", text.split("\n")[4])[3] == "2.000"
-    assert "total cost over" in report.table([*rows, row(scenario="varga7-random", seed=10)])
+    assert "total cost over" in table([*rows, row(scenario="varga7-random", seed=10)])
 
 
 WIDE = [
@@ -133,10 +141,10 @@ WIDE = [
 
 def test_lines_fit_the_width_and_columns_that_do_not_are_named():
     for width in (80, 120):
-        text = report.table(WIDE, [Skipped("zhang3-helix", "follow_nominal", "word " * 60)], width=width)
+        text = table(WIDE, [Skipped("zhang3-helix", "follow_nominal", "word " * 60)], width=width)
         assert max(len(line.replace("\u0307", "")) for line in text.split("\n")) <= width
         assert "rhc_gradient:horizon=50,alpha_max=1.2345e-05,alpha_factor=1.234\n" in text  # in full, on its own line
-    narrow, wide = report.table(WIDE, width=80), report.table(WIDE, width=200)
+    narrow, wide = table(WIDE, width=80), table(WIDE, width=200)
     assert "left out" not in wide
     gone, head = narrow.partition("left out at 80 characters a line: ")[2], narrow.splitlines()[1].split()
     gone = " ".join(gone.split()).split(", ")
@@ -153,7 +161,7 @@ def test_labels_say_what_is_not_the_default():
         row(policy="unheard_of", parameters={"a": 2}),
         row(policy="alone", parameters={"a": 2}),
     ]
-    assert [one["policy"] for one in summarise(rows)] == [
+    assert summarise(rows).label.tolist() == [
         "dls",
         "dls:damping=0.01",
         "unheard_of:a=1",
@@ -164,7 +172,7 @@ def test_labels_say_what_is_not_the_default():
 
 def test_readme():
     skipped = [Skipped("zhang3-helix", "follow_nominal", "needs a joint path")]
-    text = report.readme([BASE, REFERENCE], skipped, command="python -m x", date=DATE)
+    text = readme([BASE, REFERENCE], skipped, command="python -m x", date=DATE)
     for part in (
         "varga7-fast: 3000 steps\n",
         "command: python -m x",
@@ -181,7 +189,7 @@ def test_nothing_in_a_name_is_markup_in_the_readme():
     markdown_it = pytest.importorskip("markdown_it")
     name = "<script>run()</script> {run()} `{run()}` [x](javascript:run())\n\n# x\n```\n````"
     rows = [row(scenario=name, policy=f"x:{name}", parameters={name: name}, cost_ratio=0.5)]
-    text = report.readme(rows, [Skipped(name, name, name)], command=name, date=DATE)
+    text = readme(rows, [Skipped(name, name, name)], command=name, date=DATE)
     blocks = markdown_it.MarkdownIt("commonmark").parse(text)
     assert [block.type for block in blocks] == ["heading_open", "inline", "heading_close", "fence"]
 

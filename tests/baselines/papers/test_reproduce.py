@@ -8,7 +8,7 @@ import re
 import pytest
 
 from baselines.cli.commands.reproduce import main
-from baselines.evaluation.records import from_csv
+from baselines.evaluation.table import from_csv
 from baselines.papers import PAPERS, ledger
 from baselines.papers.paper import Finding
 from baselines.papers.runs import Runs

@@ -10,12 +10,13 @@ import pytest
 
 from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
-from baselines.evaluation.html.page import COLUMNS, embedded, page
+from baselines.evaluation.columns import REPORT, columns
+from baselines.evaluation.html.page import embedded, page
 from baselines.evaluation.jobs import Options, Skipped
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.results import PAGE, Results, read_rows
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import LAST, filled, html
+from baselines.evaluation.table import LAST, html
 from baselines.files import ResultsError
 from baselines.statistics import geometric_interval
 from tests.baselines.evaluation.html.conftest import EPISODES, NASTY, STEPS
@@ -39,9 +40,14 @@ def text(folder):
 
 
 def cells(entry):
-    """Sort value and text of each cell of the entry's line, by the head of its column."""
-    found = re.findall(r"<td(?: class=\"number\" data-order=\"([^\"]*)\")?>([^<]*)</td>", html(COLUMNS, [entry]))
-    return dict(zip(["scenario", *(column.head for column in filled(COLUMNS, [entry]))], found, strict=True))
+    """Sort value and text of each cell of a frame of one line, by the head of its column."""
+    shown = columns(REPORT, entry)
+    found = re.findall(r"<td(?: class=\"number\" data-order=\"([^\"]*)\")?>([^<]*)</td>", html(shown, entry))
+    return dict(zip(["scenario", *(column.head for column in shown)], found, strict=True))
+
+
+def table(lines):
+    return html(columns(REPORT, lines), lines)
 
 
 def test_nothing_comes_from_elsewhere_and_names_are_text(text):
@@ -57,11 +63,9 @@ def test_nothing_comes_from_elsewhere_and_names_are_text(text):
 def test_the_table_has_the_numbers_of_the_results(folder):
     rows = read_rows(folder / "results.json")
     shown = summarise(rows)
-    assert [one["policy"] for one in shown] == ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"] * 2 + [
-        "dls"
-    ]
+    assert shown.label.tolist() == ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"] * 2 + ["dls"]
     own = [row for row in rows if (row.scenario, row.policy) == (NASTY, "moore_penrose")]
-    line = cells(shown[1])
+    line = cells(shown.iloc[[1]])
     assert float(line["total cost"][0]) == pytest.approx(math.prod(row.total_cost for row in own) ** (1 / EPISODES))
     assert float(line["pos max [mm]"][0]) == max(1e3 * row.position_error_max for row in own)
     assert line["at q̈ limit"][1] == str(sum(row.steps_at_acceleration_limit for row in own)) != "0"
@@ -72,40 +76,44 @@ def test_the_table_has_the_numbers_of_the_results(folder):
 def test_the_interval_is_that_of_the_cost_ratio_over_the_episodes():
     rows = [dataclasses.replace(BASE, seed=seed, cost_ratio=1.0 + 0.1 * seed) for seed in range(1, 6)]
     low, high = geometric_interval([row.cost_ratio for row in rows])
-    (entry,) = summarise(rows)
-    assert (entry["low"], entry["high"]) == (low, high)
+    entry = summarise(rows)
+    assert (entry.low[0], entry.high[0]) == (low, high)
     assert cells(entry)["95 %"] == (str(low), f"{low:.4g} … {high:.4g}")
-    assert "95 %" not in cells(summarise(rows[:1])[0])
+    assert "95 %" not in cells(summarise(rows[:1]))
 
 
 def test_total_costs_are_not_shown_as_ratios():
     """A policy whose best known costs are all known, beside one with an episode of which none is."""
     rows = [dataclasses.replace(BASE, seed=seed, cost_ratio=2.0) for seed in (0, 1)]
     rows += [dataclasses.replace(BASE, policy="other", seed=seed, cost_ratio=None) for seed in (0, 5)]
-    first, second = summarise(rows)
+    lines = summarise(rows)
+    first, second = lines.iloc[[0]], lines.iloc[[1]]
     assert cells(first)["cost ratio"] == ("2.0", "2.000")
     assert not {"95 %", "worst"} & {*cells(first), *cells(second)}
     known = [dataclasses.replace(row, scenario="known") for row in rows[:2]]
-    text = html(COLUMNS, [second, *summarise(known)])
+    text = table(summarise([*rows[2:], *known]))
     assert text.count(f'data-order="{LAST}">–') >= 3  # the ratio, its interval and the worst
 
 
 def test_missing_numbers_are_dashes_and_sorted_last():
     lost = {"total_cost": math.nan, "position_error_max": math.inf}
-    (entry,) = summarise([dataclasses.replace(BASE, **lost, time_p50_us=None, orientation_error_max=None)])
+    missing = dict.fromkeys(("time_p50_us", "deadline_misses", "orientation_error_max"))
+    worst = dataclasses.replace(BASE, **lost, **missing)
+    entry = summarise([worst])
     line = cells(entry)
     assert not {"total cost", "p50 [µs]", "ori max [mrad]"} & set(line)
-    two = html(COLUMNS, [entry, *summarise([dataclasses.replace(BASE, policy="other")])])
+    two = table(summarise([worst, dataclasses.replace(BASE, policy="other")]))
     assert two.count(f'data-order="{LAST}">–') == 4  # costs, orientation, time and its misses
     assert line["lost"] == ("1", "1")
 
 
 def test_the_series_are_those_of_the_first_episodes(folder, text):
-    for entry, one in zip(data_of(text), summarise(read_rows(folder / "results.json")), strict=True):
-        assert entry["seed"] == one["first"].seed
-        assert entry["series"]["rows"] == one["steps"]
+    lines = summarise(read_rows(folder / "results.json"))
+    for entry, one in zip(data_of(text), lines.itertuples(), strict=True):
+        assert entry["seed"] == one.first_seed
+        assert entry["series"]["rows"] == one.steps
         assert len(entry["series"]["joint_names"]) == 7
-        assert entry["series"]["arrays"]["q"]["shape"] == [min(one["steps"], 400), 7]
+        assert entry["series"]["arrays"]["q"]["shape"] == [min(one.steps, 400), 7]
     assert STEPS > 400
     largest = max(len(json.dumps(entry["series"])) for entry in data_of(text))
     assert len(text.encode()) + 2 * largest < 8e6  # a demo of ten policies
@@ -114,14 +122,15 @@ def test_the_series_are_those_of_the_first_episodes(folder, text):
 def test_a_folder_without_logs_has_a_page_and_a_damaged_log_is_named(folder, tmp_path):
     rows = read_rows(folder / "results.json")
     (tmp_path / "results.json").write_text(json.dumps([row.to_json() for row in rows]), encoding="utf-8")
-    written = page(results_of(tmp_path), [Skipped("a", "<em>", "too <u>small")], command="x < y", date=DATE).decode()
+    skipped = [Skipped("a", "<em>", "too <u>small")]
+    written = page(results_of(tmp_path), summarise(rows), skipped, command="x < y", date=DATE).decode()
     assert [entry["series"] for entry in data_of(written)] == [None] * 9
     assert "&lt;em&gt; in a: too &lt;u&gt;small" in written
     file = results_of(tmp_path).series_file(rows[0])
     file.parent.mkdir(parents=True)
     file.write_bytes(b"nothing")
     with pytest.raises(ResultsError, match=r"npz is damaged"):
-        page(results_of(tmp_path), command="x", date=DATE)
+        page(results_of(tmp_path), summarise(rows), command="x", date=DATE)
 
 
 def test_it_can_be_left_out_and_is_overwritten(tmp_path, capsys):

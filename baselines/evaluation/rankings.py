@@ -1,0 +1,78 @@
+"""Comparisons in a folder of results: policies ranked by cost ratio, and a map over severities of the plant."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+from tqdm import tqdm
+
+from baselines.evaluation.jobs import Job
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.plots import comparison
+from baselines.evaluation.plots.style import png
+from baselines.evaluation.results import slug
+from baselines.evaluation.summary import rank
+from baselines.evaluation.table import markdown, records, to_csv
+from baselines.files import write
+from baselines.oracle import Search
+from baselines.oracle.several import Wanted, find_all
+
+#: Columns of all tables, and of those with free timing or collisions.
+COLUMNS: tuple[str, ...] = (
+    *("policy", "scenario", "foresight", "seeds", "episodes", "relative_to", "cost_ratio", "low", "high", "p90"),
+    *("worst", "lost_percent", "time_p50_us", "time_p99_us"),
+)
+PATH, CONTACTS = ("path_time_s", "path_error_mm"), ("stopped_percent", "clearance_mm")
+#: Columns of the Markdown table of a map.
+CELLS = ("policy", "knowledge", "drives", "episodes", "cost_ratio", "low", "worst", "lost_percent")
+#: The search for best known costs that are not recorded: on these paths all starts find the same optimum.
+HOW = Search(starts=20, generations=0)
+
+
+def ranking(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
+    """The table of policies, see :func:`baselines.evaluation.summary.rank`.
+
+    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
+    the largest distance from the reference at the policy's own progress, or on the clock of the others. Where a
+    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
+    """
+    lines = rank(rows, policies)
+    more = PATH * bool(lines.free_timing.any()) + CONTACTS * bool(lines.stopped.notna().any())
+    lines["path_error_mm"] = lines.path_error_mm.where(lines.free_timing, lines.position_error_mm)
+    return lines.drop(columns="policy").rename(columns={"label": "policy"})[[*COLUMNS, *more]]
+
+
+def write_ranking(out: pathlib.Path, rows: Iterable[Row], policies: Sequence[str]) -> None:
+    """Writes table.csv, table.md, and plots of cost against time and against foresight."""
+    lines = ranking(rows, policies)
+    write(out / "table.csv", to_csv(lines).encode())
+    write(out / "table.md", f"{markdown(lines)}\n".encode())
+    for scenario, here in lines.groupby("scenario", sort=False):
+        write(out / f"cost-time-{slug(str(scenario))}.png", png(comparison.cost_time(records(here), str(scenario))))
+    by_name = records(lines.assign(name=lines.policy.str.partition(":")[0]))
+    write(out / "foresight.png", png(comparison.foresight(by_name, "Cost against foresight", "name")))
+
+
+def write_map(out: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], policies: Sequence[str]) -> None:
+    """Writes map.csv, map.md and map.png; best known costs that are not recorded are searched and cached."""
+    jobs_by_key = {job.key: job for job in jobs}
+    missing = {(row.scenario, row.seed): jobs_by_key[row.key] for row in rows if row.cost_ratio is None}
+    wanted = [Wanted(job.scenario, job.seeds._replace(noise_seed=0), HOW) for job in missing.values()]
+    found = {
+        (one.scenario.name, one.draw.seed): optimum.cost
+        for one, optimum in tqdm(find_all(wanted), total=len(wanted), unit="best known cost")
+    }
+    scored = [
+        dataclasses.replace(row, cost_ratio=row.cost_ratio or row.total_cost / found[row.scenario, row.seed])
+        for row in rows
+    ]
+    lines = ranking(scored, policies)
+    places = lines.scenario.str.rsplit(" ", n=2)
+    lines.insert(1, "knowledge", [float(words[1]) for words in places])
+    lines.insert(2, "drives", [float(words[2]) for words in places])
+    write(out / "map.csv", to_csv(lines).encode())
+    write(out / "map.md", f"{markdown(lines, CELLS)}\n".encode())
+    write(out / "map.png", png(comparison.severity_map(records(lines))))
