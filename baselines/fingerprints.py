@@ -16,7 +16,7 @@ from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
 #: Fields of a scenario that change no result: texts, and fields that matter only where bodies may not touch.
-APART = {"name", "source", "obstacles", "collisions", "proximity"}
+APART = {"name", "policy", "source", "obstacles", "collisions", "proximity"}
 #: Numbers in arrays, mostly of the order of 1, count up to here.
 DECIMALS = 12
 

@@ -50,6 +50,7 @@ class RobotOptions:
 
 #: The names of these options.
 ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--acceleration")
+TOOL = "--tool-acceleration"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,8 +74,11 @@ class OwnPath(RobotOptions):
     """Control period in [s]: 0.004 by default, or that of the scenario."""
 
 
-_WITH_CSV = (*ROBOT_OPTIONS[:3], "--speed", "--tool-acceleration", "--corner-radius", "--task")
-RULES = (Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),)
+_WITH_CSV = (*ROBOT_OPTIONS[:3], "--speed", TOOL, "--corner-radius", "--task")
+RULES = (
+    Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),
+    Rule(ROBOT_OPTIONS[:3], lambda given: (given.arm or "").endswith(".urdf"), "without a URDF file"),
+)
 
 
 def scenario_of(options: OwnPath) -> Scenario:
@@ -94,8 +98,8 @@ def _from_csv(options: OwnPath) -> Scenario:
     arm, speed = options.robot(options.arm), options.speed
     law: dict[str, Any] = {}
     if speed is not None:
-        usual = number("--speed", speed, above=0.0) / SPEEDING_UP
-        law = {"speed": speed, "acceleration": options.tool_acceleration or usual}
+        usual, given = number("--speed", speed, above=0.0) / SPEEDING_UP, options.tool_acceleration
+        law = {"speed": speed, "acceleration": usual if given is None else number(TOOL, given, above=0.0)}
     trajectory = from_csv(options.file, corner_radius=options.corner_radius, **law)
     task = options.task or ("pose" if trajectory.has_orientation else "position")
     dt = 0.004 if options.dt is None else options.dt

@@ -62,6 +62,9 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
             raise InvalidInputError(f"{_in_one_line(said.getvalue())} See {prog} --help.") from None
         raise
     check_sizes("", options)
+    for name, word in given.items():
+        if getattr(options, name.lstrip("-").replace("-", "_"), None) == ():
+            raise InvalidInputError(f"{word}: expected a value, got none.")
     for rule in rules:
         for name in rule.names:
             if name in given and not rule.used(options):
@@ -86,12 +89,16 @@ class EpisodeOptions:
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
     """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("qp",)
-    """Policies side by side, as evaluate takes them."""
+    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ()
+    """Policies side by side, as evaluate takes them; the one that the scenario names if left out, else qp."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Reset seed of the episode."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Number of steps; all of the scenario if left out."""
+
+    def policies(self, scenario: Scenario) -> tuple[str, ...]:
+        """The policies that are shown in a scenario."""
+        return self.policy or (scenario.policy or "qp",)
 
 
 def find_own_modules() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import sys
@@ -34,6 +36,9 @@ EXTRAS = {
 
 #: The message after Ctrl-C of commands with ``--resume``.
 RESUMED = "Finished work is in {out}; continue with --resume."
+
+#: Fewest characters of the last column of a table, and of others that are wrapped.
+LAST, NARROWEST = 16, 9
 
 P = TypeVar("P")
 
@@ -173,15 +178,32 @@ def listed(
 
 
 def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
-    """A table of rows of cells, the head first; the last column is wrapped to fit the width in characters."""
+    """A table of rows of cells, the head first, that fits the width in characters; the last column fills the line.
+
+    Where that leaves too little to the last column, the widest of the others are wrapped, too, names at underscores.
+    """
     sizes = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)]
-    start = sum(sizes) + 2 * len(sizes)
-    lines = []
+    while sizes and sum(sizes) + 2 * len(sizes) + LAST > most and max(sizes) > NARROWEST:
+        sizes[sizes.index(max(sizes))] -= 1
+    last = max(most - sum(sizes) - 2 * len(sizes), LAST)
+    lines: list[list[str]] = []
     for row in rows:
-        wrapped = textwrap.wrap(row[-1], max(most - start, 16), break_on_hyphens=False) or [""]
-        cells = "  ".join(f"{cell:{size}}" for cell, size in zip(row[:-1], sizes, strict=True))
-        lines += [f"{cells}  {wrapped[0]}".rstrip(), *(" " * start + line for line in wrapped[1:])]
-    return "\n".join([*lines[:1], "-" * min(max(map(len, lines)), most), *lines[1:]])
+        cells = [_wrapped(cell, size) for cell, size in zip(row, (*sizes, last), strict=True)]
+        lines.append([])
+        for parts in itertools.zip_longest(*cells, fillvalue=""):
+            lines[-1].append(
+                "  ".join(f"{part:{size}}" for part, size in zip(parts, (*sizes, 0), strict=True)).rstrip()
+            )
+    head, *others = lines
+    longest = max(len(line) for one in lines for line in one)
+    return "\n".join([*head, "-" * min(longest, most), *(line for one in others for line in one)])
+
+
+def _wrapped(cell: str, size: int) -> list[str]:
+    wrapper = textwrap.TextWrapper(size, break_on_hyphens=False)
+    if len(max(cell.split(), key=len, default="")) > size:
+        wrapper.wordsep_simple_re = re.compile(r"(\s+|(?<=_))")
+    return wrapper.wrap(cell)
 
 
 def numbers(values: Sequence[float] | FloatArray) -> str:

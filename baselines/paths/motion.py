@@ -21,10 +21,13 @@ from ikgym.simulator import Simulator
 from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray
 
+#: The solver that surveys paths, and those that are tried where it does not follow closely.
+PREFERRED, OTHERS = "qp", ("sns", "rhc_foresight")
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
-    """Motions of `qp` along a path, from N starts and within all limits of the arm."""
+    """Motions of a solver along a path, from N starts and within all limits of the arm."""
 
     times: FloatArray  # from the start on, in [s]. Shape (k + 1,)
     q: FloatArray  # joint coordinates in [rad] or [m]. Shape (k + 1, N, n)
@@ -71,9 +74,14 @@ def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> d
     return {"trajectory": timing(scenario.trajectory), "obstacles": tuple(obstacles)}
 
 
-def played(scenario: Scenario, starts: FloatArray) -> Motion:
-    """`qp` on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, starts must be clear."""
-    policy, rows = registry.make("qp", scenario), len(starts)
+def played(scenario: Scenario, starts: FloatArray, solver: str = PREFERRED) -> Motion:
+    """A solver on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, these must be clear.
+
+    Gains of `qp` that long control periods do not allow are as large as they may be.
+    """
+    rate, gains = 1.0 / scenario.dt, {"secondary_gain": 1.0, "repulsion": 10.0}
+    smaller = {name: rate for name, gain in gains.items() if rate < gain and solver == PREFERRED}
+    policy, rows = registry.make(solver, scenario, **smaller), len(starts)
     simulator = Simulator(scenario, rows, policy.preview)
     simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(0)[0]] * rows, starts)
     out, state = simulator.observe(), None

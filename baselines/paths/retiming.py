@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
 
-from baselines.paths.motion import Motion, ideal, played
-from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, follows, survey
+from baselines.paths.motion import OTHERS, PREFERRED, Motion
+from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, followed, survey
 from baselines.paths.timing import Timing
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -17,6 +18,9 @@ from ikgym.scenarios import Scenario
 SLOWEST, PRECISION = 5.0, 0.01
 #: Most branches that are tried, and how often a timing is worked out again from the motion in the one before.
 TRIED, AGAIN = 4, 2
+
+#: Most branches along which another solver than `qp` is played, and how many times slower, one after the other.
+OTHER_BRANCHES, OTHER_SLOWER = 2, (1.0, 1.3)
 
 #: Bodies that come nearer than this in [m] are said to be in the way.
 NEAR = 0.02
@@ -30,43 +34,59 @@ class Retimed:
     """A scenario that can be driven.
 
     Args:
-        scenario: The path from the best start, in the time of `qp`.
+        scenario: The path from the best start, in a time in which the solver follows.
         duration: That time, in [s].
         asked: The time that was asked for, in [s].
-        motion: The motion of `qp` that was checked.
+        motion: The motion of the solver that was checked.
+        solver: The name of the solver.
     """
 
     scenario: Scenario
     duration: float
     asked: float
     motion: Motion
+    solver: str
+
+    @property
+    def share(self) -> float:
+        """The largest share of a limit of velocity or acceleration that the motion takes, from rest on."""
+        q, dt, scenario = self.motion.q[:, 0], self.motion.times[1], self.scenario
+        qdot = np.diff(q, axis=0, prepend=q[:1]) / dt
+        shares = (
+            np.abs(qdot) / scenario.largest_qdot,
+            np.abs(np.diff(qdot, axis=0)) / dt / scenario.arm.acceleration_limit,
+        )
+        return float(max(share.max() for share in shares))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A timing that `qp` follows from a start; with the motion."""
+    """A timing that a solver follows from a start; with the motion."""
 
     branch: Branch
     timing: Timing
     motion: Motion
+    solver: str = PREFERRED
 
 
-def retime(scenario: Scenario | Survey, *, fastest: bool = False) -> Retimed:
-    """The scenario in a time in which `qp` follows within 0.05 mm and 0.5 mrad, and all limits hold.
+def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float = 0.0) -> Retimed:
+    """The scenario in a time in which a solver follows within 0.05 mm and 0.5 mrad, and all limits hold.
 
     The path in space stays as it is. Where limits bind, it is driven slower than asked, elsewhere as fast as asked.
     A redundant arm moves otherwise at another speed; therefore each timing is played, and made slower where needed.
-    Where `qp` follows no closer at any speed, as near a singularity, 1 mm and 1 mrad will do.
+    The solver is `qp`; where that does not follow at any speed, as near a singularity, `sns` or `rhc_foresight`. Where
+    none follows so closely, 1 mm and 1 mrad of `qp` will do.
 
     Args:
         scenario: A scenario whose path is the same at every reset, or its survey.
         fastest: Whether the path may be driven faster than asked, as fast as the limits allow.
+        reserve: As for :func:`survey`, which a scenario gets.
 
     Raises:
         InvalidInputError: No start leads along the whole path, or `qp` follows from none.
         ModuleNotFoundError: toppra is not installed.
     """
-    found = scenario if isinstance(scenario, Survey) else survey(scenario)
+    found = scenario if isinstance(scenario, Survey) else survey(scenario, reserve=reserve)
     out = retimed(found, fastest=fastest)
     if out is None:
         raise InvalidInputError(
@@ -76,27 +96,39 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False) -> Retimed:
 
 
 def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
-    """The result of :func:`retime`; None where no start leads along the whole path, or `qp` follows from none."""
-    for errors in (FOLLOWED, REACHED):
-        best = _best(found, errors, fastest)
-        if best is not None:
-            return _made(found, best)
-    return None
+    """The result of :func:`retime`; None where no start leads along the whole path, or no solver follows from any."""
+    best = _best(found, FOLLOWED, fastest)
+    if best is None:
+        rough = _best(found, REACHED, fastest)
+        best = _by_another(found, rough, fastest) or rough
+    return None if best is None else _made(found, best)
 
 
 def _best(found: Survey, errors: Errors, fastest: bool) -> _Candidate | None:
-    if not fastest and found.drivable_within(errors):
-        return _Candidate(found.best, Timing.uniform(found.duration, 1.0), found.as_asked)
+    if not fastest and (motion := found.as_asked(errors)) is not None:
+        return _Candidate(found.best, Timing.uniform(found.duration, 1.0), motion)
     best: _Candidate | None = None
     for branch in found.branches[:TRIED]:
         best = _faster(found, branch, best, errors, fastest)
     for _ in range(AGAIN if best else 0):
         before = best
         assert best
-        best = _faster(found, branch_of(found.scenario, best.motion, best.timing), best, errors, fastest)
+        best = _faster(found, branch_of(found.limited, best.motion, best.timing), best, errors, fastest)
         if best is before:
             break
     return best
+
+
+def _by_another(found: Survey, rough: _Candidate | None, fastest: bool) -> _Candidate | None:
+    """A timing that another solver follows closely: that of `qp`, or those of the best branches; None if none."""
+    timings = [(one, one.shortest if fastest else one.asked) for one in found.branches[:OTHER_BRANCHES]]
+    if rough is not None:
+        timings.insert(0, (rough.branch, rough.timing))
+    for slower, solver in itertools.product(OTHER_SLOWER, OTHERS):
+        for branch, timing in timings:
+            if timing and (candidate := _followed(found, branch, timing.slower(slower), FOLLOWED, solver)):
+                return candidate
+    return None
 
 
 def refusal(found: Survey) -> str:
@@ -104,7 +136,7 @@ def refusal(found: Survey) -> str:
     best, scenario = found.best, found.scenario
     far = f"{best.position_error:.3g} m and {best.orientation_error:.3g} rad"
     if best.whole:
-        return f"qp follows it no closer than {far}, however slowly."
+        return f"no solver follows it closer than {far}, however slowly."
     time = best.reached * found.duration
     x = scenario.trajectory.frames(np.array([time]), scenario.arm)[0, -3:]
     where = f"from {time:.3g} s on, at ({', '.join(f'{one:.4g}' for one in x)}) m"
@@ -136,11 +168,13 @@ def _faster(found: Survey, branch: Branch, best: _Candidate | None, errors: Erro
     return tried
 
 
-def _followed(found: Survey, branch: Branch, timing: Timing, errors: Errors) -> _Candidate | None:
-    """The timing with its motion, if `qp` follows."""
+def _followed(
+    found: Survey, branch: Branch, timing: Timing, errors: Errors, solver: str = PREFERRED
+) -> _Candidate | None:
+    """The timing with its motion, if the solver follows."""
     trajectory = timing.of(found.scenario.trajectory)
-    motion = played(ideal(found.scenario, trajectory=trajectory, start=branch.start), branch.start[None])
-    return _Candidate(branch, timing, motion) if follows(motion, errors) else None
+    motion = followed(found.play(solver, branch.start, trajectory=trajectory), errors)
+    return None if motion is None else _Candidate(branch, timing, motion, solver)
 
 
 def _made(found: Survey, best: _Candidate) -> Retimed:
@@ -148,5 +182,6 @@ def _made(found: Survey, best: _Candidate) -> Retimed:
     if best.timing.duration != found.duration:
         changes |= {"trajectory": best.timing.of(found.scenario.trajectory), "steps": None}
     name = f"{found.scenario.name}-retimed"
+    changes["policy"] = None if best.solver == PREFERRED else best.solver
     scenario = found.scenario.replace(name=name, start=best.branch.start, **changes)
-    return Retimed(scenario, best.timing.duration, found.duration, best.motion)
+    return Retimed(scenario, best.timing.duration, found.duration, best.motion, best.solver)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.paths.motion import Motion, ideal, in_time, path_duration, played
+from baselines.paths.motion import PREFERRED, Motion, ideal, in_time, path_duration, played
 from baselines.paths.starts import starts
 from baselines.paths.timing import Timing, grid, shortest
+from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import pair_names
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, number
 
 #: Errors in [m] and [rad] within which a pose of the path counts as reached.
 REACHED = 1e-3, 1e-3
@@ -32,7 +34,9 @@ FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: Timings that take at most so many times the requested time count as the same. Joints nearer to a stop than the first
 #: of these distances, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
 #: with more than the last share of a velocity limit, where accelerations are not limited.
-SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.3, 0.1
+SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.8, 0.1
+#: The longest control period, as a share of the path's duration.
+SHARE = 0.1
 #: A clearance in [m] below the first of these, less than `qp` keeps, is too small; more than the second is no better.
 CLOSE, CLEAR = 0.003, 0.05
 
@@ -119,11 +123,13 @@ class Survey:
         scenario: The scenario.
         duration: The time that is asked for, in [s].
         branches: The best first.
+        reserve: The share of the limits of velocity and acceleration that motions leave to feedback.
     """
 
     scenario: Scenario
     duration: float
     branches: tuple[Branch, ...]
+    reserve: float = 0.0
 
     @property
     def best(self) -> Branch:
@@ -131,18 +137,48 @@ class Survey:
         return self.branches[0]
 
     @functools.cached_property
-    def as_asked(self) -> Motion:
-        """The motion of `qp` from the best start, within all limits and in the time that is asked for."""
-        return played(ideal(self.scenario, start=self.best.start), self.best.start[None])
+    def limited(self) -> Scenario:
+        """The scenario with the limits that motions keep."""
+        return with_reserve(self.scenario, self.reserve)
 
     @property
     def drivable(self) -> bool:
         """Whether `qp` follows the path from the best start, in the time that is asked for and within all limits."""
-        return self.drivable_within(FOLLOWED)
+        return self.as_asked() is not None
 
-    def drivable_within(self, errors: tuple[float, float]) -> bool:
-        """The same with other errors in [m] and [rad]."""
-        return self.best.whole and self.best.slowing == 1.0 and follows(self.as_asked, errors)
+    def as_asked(self, errors: tuple[float, float] = FOLLOWED, solver: str = PREFERRED) -> Motion | None:
+        """The motion of a solver from the best start in the time asked for; None if it errs more, in [m] and [rad]."""
+        if not self.best.whole or self.best.slowing > 1.0:
+            return None
+        if solver not in self._motions:
+            self._motions[solver] = self.play(solver, start=self.best.start)
+        return followed(self._motions[solver], errors)
+
+    def play(self, solver: str, start: FloatArray, **changes: Any) -> list[Motion]:
+        """Motions of a solver from a start on the changed scenario: within the limits less the reserve, and the whole.
+
+        A redundant arm may move otherwise within the whole limits.
+        """
+        scenarios = [self.limited] if self.reserve == 0.0 else [self.limited, self.scenario]
+        return [played(ideal(scenario, start=start, **changes), start[None], solver) for scenario in scenarios]
+
+    @functools.cached_property
+    def _motions(self) -> dict[str, list[Motion]]:
+        return {}
+
+
+def followed(motions: Sequence[Motion], errors: tuple[float, float]) -> Motion | None:
+    """The last of motions that all follow within errors in [m] and [rad]; None if one does not."""
+    return motions[-1] if all(follows(motion, errors) for motion in motions) else None
+
+
+def with_reserve(scenario: Scenario, reserve: float) -> Scenario:
+    """The scenario with limits of velocity and acceleration that are smaller by a share; the same without one."""
+    if reserve == 0.0:
+        return scenario
+    arm, left = scenario.arm, 1.0 - reserve
+    slower = {name: left * getattr(arm, name) for name in ("velocity_limit", "acceleration_limit")}
+    return scenario.replace(arm=arm.replace(**slower), velocity_limit=left * scenario.velocity_limit)
 
 
 def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
@@ -152,7 +188,7 @@ def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
     return bool(position <= errors[0] and orientation <= errors[1] and free)
 
 
-def survey(scenario: Scenario) -> Survey:
+def survey(scenario: Scenario, *, reserve: float = 0.0) -> Survey:
     """Follows a path from several start branches, and times each of them.
 
     Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
@@ -161,12 +197,19 @@ def survey(scenario: Scenario) -> Survey:
 
     Args:
         scenario: A scenario whose path is the same at every reset. Its plant is taken to be ideal.
+        reserve: The share of the limits of velocity and acceleration that motions leave to feedback, from 0 to 0.9.
 
     Raises:
-        InvalidInputError: The path is random, its first pose is out of reach, or none of its postures is clear.
+        InvalidInputError: The path is random, its first pose is out of reach, none of its postures is clear, or the
+            control period is longer than a tenth of the path.
         ModuleNotFoundError: toppra is not installed.
     """
-    duration = path_duration(scenario)
+    reserve, duration = number("reserve", reserve, at_least=0.0, at_most=0.9), path_duration(scenario)
+    if scenario.dt > SHARE * duration:
+        raise InvalidInputError(
+            f"dt: expected a control period of at most a tenth of the path's {duration:.4g} s, got {scenario.dt:g} s."
+        )
+    whole, scenario = scenario, with_reserve(scenario, reserve)
     begin = starts(ideal(scenario))
     branches = _branches(scenario, begin, 1.0)
     if sum(branch.whole for branch in branches) < 0.5 * len(branches):
@@ -176,7 +219,7 @@ def survey(scenario: Scenario) -> Survey:
         slowest = [branch.whole and branch.slowing == SLOWEST for branch in branches]
         if sum(slowest) > 0.5 * sum(branch.whole for branch in branches):
             _play_again(scenario, branches, slowest, factor)
-    return Survey(scenario, duration, tuple(sorted(branches, key=Branch.rank)))
+    return Survey(whole, duration, tuple(sorted(branches, key=Branch.rank)), reserve)
 
 
 def _play_again(scenario: Scenario, branches: list[Branch], chosen: list[bool], slowing: float) -> None:

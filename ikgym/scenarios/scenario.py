@@ -57,6 +57,7 @@ class Scenario(Frozen, Surrounded):
         collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
             By default it is where there are obstacles.
         proximity: The cost of bodies that come near, in a scenario with collisions; none by default.
+        policy: A policy that follows the path closely, such as ``"sns"``: the default of commands that show episodes.
         source: Origin of the scenario.
 
     Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
@@ -81,6 +82,7 @@ class Scenario(Frozen, Surrounded):
     obstacles: Sequence[Obstacle] = ()
     collisions: bool | None = None
     proximity: ProximityCost | None = None
+    policy: str | None = None
     source: str = ""
 
     def __post_init__(self) -> None:

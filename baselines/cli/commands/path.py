@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+import textwrap
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,17 +13,21 @@ import tyro
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, scenario_of
 from baselines.paths import Branch, Retimed, Survey, survey
+from baselines.paths.motion import OTHERS, PREFERRED
 from baselines.paths.retiming import refusal, retimed
 from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
+from ikgym import tasks
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
-from ikgym.validation import BoolArray, FloatArray, whole_number
+from ikgym.validation import BoolArray, FloatArray, number, whole_number
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
+#: With 0.1 the control loop keeps its path on late drives, with 0 it loses it; see docs/real-arm.md.
+RESERVE = 0.15
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +40,8 @@ class Options(OwnPath):
     """Times the path as fast as the limits allow, not only as fast as asked."""
     branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Takes the start in this line of the table."""
+    reserve: Annotated[float, tyro.conf.arg(metavar="SHARE")] = RESERVE
+    """Share of the limits of velocity and acceleration that the motion leaves to the feedback of a real arm."""
     obstacles: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Obstacles of another scenario file, or of a file with nothing else, instead of those of the scenario."""
     bodies: Literal["on", "off"] | None = None
@@ -45,8 +52,8 @@ def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Says whether an arm can drive a path, from which start and how fast: qp plays it from several postures at the first
-pose, and toppra finds the shortest time in which the limits hold. Where the arm has bodies, it keeps clear of itself
-and of obstacles. Needs pip install "ikgym[paths]".
+pose, and toppra finds the shortest time in which the limits hold, less a reserve for feedback. Where the arm has
+bodies, it keeps clear of itself and of obstacles. Needs pip install "ikgym[paths]".
 
 Examples:
   {prog} weld.toml --retime weld-retimed.toml
@@ -57,17 +64,27 @@ Examples:
 def _work(options: Options, _: str) -> None:
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
-    every = found = survey(_scenario(options))
+    reserve = number("--reserve", options.reserve, at_least=0.0, at_most=0.9)
+    every = found = survey(_scenario(options), reserve=reserve)
     if options.branch is not None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])
     driven = retimed(found, fastest=options.fastest)
-    print("\n".join([*_head(found), "", _table(every), "", *_verdict(found, driven)]))
+    head, verdict = ([_folded(line) for line in lines] for lines in (_head(found), _verdict(found, driven)))
+    print("\n".join([*head, "", _table(every), "", *verdict]))
     if options.retime is not None:
         if driven is None:
             raise InvalidInputError(f"--retime: the path cannot be driven, {options.retime} is not written.")
         driven.scenario.save(options.retime)
         print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
+
+
+def _folded(line: str) -> str:
+    """A line in the width of the terminal; a start, which is copied into files, stays in one."""
+    if line.startswith("start = "):
+        return line
+    indent = "  " if line.startswith("  ") else ""
+    return textwrap.fill(line, shell.width(), break_on_hyphens=False, subsequent_indent=indent)
 
 
 def _scenario(options: Options) -> Scenario:
@@ -156,20 +173,51 @@ def _unit(arm: Arm, joint: int) -> str:
 
 def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
     if driven is None:
-        return [f"It cannot be driven: {refusal(found)}"]
+        return [f"It cannot be driven: {refusal(found)}", *_free_about_z(found)]
     motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
-    how = f"qp follows within {_small(motion.position_error.max(), 'm')}"
+    how = f"{driven.solver} follows within {_small(motion.position_error.max(), 'm')}"
     if found.scenario.task.has_orientation:
         how += f" and {_small(motion.orientation_error.max(), 'rad')}"
     if not follows(motion):
-        how += " (no closer: a stop or a singularity is near)"
-    can = "It can be driven as it is"
-    if driven.duration != found.duration:
-        speed = f"in {driven.duration:.3g} s, at up to {fastest(driven.scenario)[0]:.3g} m/s"
-        as_asked = found.drivable_within(REACHED)
-        can = f"{can}, and {speed}" if as_asked else f"It cannot be driven in {found.duration:.3g} s, but {speed}"
+        how += f" (no closer, nor do {' and '.join(OTHERS)}: a stop or a singularity is near)"
+    elif driven.solver != PREFERRED:
+        how += f" (where {PREFERRED} does not: a stop or a singularity is near)"
     hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
-    return [f"{can}: {how}, {hold}.", f"start = [{start}]"]
+    used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve else ""
+    lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]
+    if driven.solver != PREFERRED:
+        lines.append(f"Play it with {driven.solver}: evaluate --policies, Controller(…, {driven.solver!r}).")
+    return lines
+
+
+def _when(found: Survey, driven: Retimed) -> str:
+    """Whether the path can be driven in the time that was asked for, and in which one it can."""
+    can = "It can be driven as it is"
+    if driven.duration == found.duration:
+        return can
+    speed = f"in {driven.duration:.3g} s, at up to {fastest(driven.scenario)[0]:.3g} m/s"
+    if any(found.as_asked(REACHED, solver) for solver in {PREFERRED, driven.solver}):
+        return f"{can}, and {speed}"
+    if driven.duration < found.duration:
+        return f"It cannot be driven at the speeds that were asked for, but at others, {speed}"
+    kept = f", with {100 * found.reserve:.3g} % of the limits in reserve (--reserve)" if found.reserve else ""
+    return f"It cannot be driven in {found.duration:.3g} s, but {speed}{kept}"
+
+
+def _free_about_z(found: Survey) -> list[str]:
+    """Whether the path can be driven if the tool may turn about its z axis; nothing where it cannot, or may already."""
+    if found.scenario.task.error_size < 6:
+        return []
+    try:
+        free = survey(found.scenario.replace(task=tasks.get("axis"), initial_pose=None), reserve=found.reserve)
+    except InvalidInputError:
+        return []
+    driven = retimed(free)
+    if driven is None:
+        return []
+    return [
+        f'It can, in {driven.duration:.3g} s, if the tool may turn about its z axis: --task axis, or task = "axis".'
+    ]
 
 
 def _unstated(arm: Arm) -> BoolArray:

@@ -72,7 +72,7 @@ def _work(options: Options, _: str) -> None:
             f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {options.speed:g}."
         )
     check_writable(options.out.absolute().parent)
-    replays = play_all(stage, options.policy)
+    replays = play_all(stage, options.policies(stage.scenario))
     steps = np.append(np.rint(np.arange(0.0, last, between / stage.scenario.dt)), last).astype(np.int64)
     across = min(len(replays), 2)
     size = across * width, -(-len(replays) // across) * width // 2

@@ -52,7 +52,7 @@ def _work(options: Options, _: str) -> None:
     port = free_port(options.host, options.port)
     stage = Stage.of(options.scenario, options.seed, options.steps)
     shapes = meshes(stage.scenario.arm, options.urdf)
-    session = Session(stage, options.policy)
+    session = Session(stage, options.policies(stage.scenario))
     with serving(options.host, port) as server:
         viewer = Viewer(server, session, shapes)
         print(f"http://{server.get_host()}:{server.get_port()}  (Ctrl-C ends it)", flush=True)

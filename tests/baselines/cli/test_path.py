@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import re
 import sys
 from pathlib import Path
@@ -13,6 +15,9 @@ import baselines
 import ikgym
 from baselines.cli import main
 from baselines.cli.commands import path
+from baselines.cli.parsing import EpisodeOptions
+from baselines.paths import retiming
+from baselines.paths.starts import starts
 from docs.compare import FOLDER, ROBOTS
 
 
@@ -24,6 +29,7 @@ def called_by_its_name(monkeypatch, tmp_path):
     Path("weld.csv").write_text("x, y, z\n0.45, -0.1, 0.4\n0.5, 0, 0.4\n0.45, 0.1, 0.4\n")
 
 
+module = importlib.import_module("baselines.paths.survey")  # a function has that name
 WELD = ("path", "weld.csv", "--arm", "panda", "--dt", "0.02")
 
 
@@ -53,7 +59,9 @@ def test_arms_that_are_not_in_the_catalogue(robot, capsys):
 def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkeypatch):
     known, survey = [], path.survey
     monkeypatch.setattr(
-        path, "survey", lambda scenario: known[0] if known else known.append(survey(scenario)) or known[0]
+        path,
+        "survey",
+        lambda scenario, **more: known[0] if known else known.append(survey(scenario, **more)) or known[0],
     )
     words = [*WELD, "--bodies", "off", "--speed", "3", "--tool-acceleration", "30", "--retime", "slow.toml", "--branch"]
     assert main([*words, "2"]) == 0
@@ -91,6 +99,16 @@ def test_a_path_out_of_reach(capsys):
         (["path", str(FOLDER / "ur10.csv"), "--arm", "panda"], "speed: expected a number, or times of the waypoints"),
         (["path", str(FOLDER / "ur10.csv"), "--arm", "panda", "--speed", "-1"], "--speed"),
         (command("ur10", "--acceleration", "1", "2"), "--acceleration"),
+        (command("ur10", "--acceleration"), "--acceleration: expected a value, got none"),
+        ([*WELD, "--speed", "0.2", "--tip", "nonsense"], "--tip has no effect without a URDF file"),
+        ([*WELD, "--speed", "0.2", "--base", "nonsense"], "--base has no effect without a URDF file"),
+        ([*WELD, "--speed", "0.2", "--tool", "0", "0", "1"], "--tool has no effect without a URDF file"),
+        (
+            [*WELD, "--speed", "0.2", "--tool-acceleration", "0"],
+            "--tool-acceleration: expected a finite number above 0",
+        ),
+        ([*WELD[:-1], "10", "--speed", "0.2"], "dt: expected a control period of at most a tenth of the path's"),
+        ([*WELD, "--speed", "0.2", "--reserve", "1"], "--reserve: expected"),
     ],
 )
 def test_bad_input(words, message, capsys):
@@ -116,3 +134,57 @@ def test_obstacles_of_a_file(capsys):
     Path("cell.toml").write_text(box.replace("size", "sizes"))
     assert main(words) == 2
     assert "cell.toml" in capsys.readouterr().err
+
+
+@pytest.fixture
+def worse_qp(monkeypatch):
+    """A `qp` that errs by half a millimetre more, as near a singularity, and one start."""
+    whole = module.played
+
+    def worse(scenario, starts, solver="qp"):
+        motion = whole(scenario, starts, solver)
+        more = 5e-4 if solver == "qp" else 0.0
+        return dataclasses.replace(motion, position_error=motion.position_error + more)
+
+    monkeypatch.setattr(module, "played", worse)
+    monkeypatch.setattr(module, "starts", lambda scenario: starts(scenario)[:1])
+
+
+def test_another_solver_is_tried_before_a_singularity_is_blamed(worse_qp, monkeypatch, capsys):
+    words = command("ur10", "--acceleration", "20", "--dt", "0.02", "--retime", "out.toml")
+    assert main(words) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "sns follows within 0.0" in text
+    assert "(where qp does not: a stop or a singularity is near)" in text
+    assert "Play it with sns" in text
+    scenario = ikgym.scenarios.load("out.toml")
+    assert scenario.policy == "sns"
+    assert EpisodeOptions().policies(scenario) == ("sns",)
+    assert EpisodeOptions(policy=("dls",)).policies(scenario) == ("dls",)
+    monkeypatch.setattr(retiming, "OTHERS", ())
+    assert main(words) == 0
+    assert "(no closer, nor do sns and rhc_foresight: a stop or" in " ".join(capsys.readouterr().out.split())
+    assert ikgym.scenarios.load("out.toml").policy is None
+
+
+def test_a_free_rotation_is_suggested_where_it_helps(capsys):
+    """The tool has to turn by more than the last joint can, beside a base that it cannot go around."""
+    turns = [(0.0, 1.0), (0.8, 0.6), (1.0, 0.0), (0.8, -0.6), (0.0, -1.0), (-0.8, -0.6), (-1.0, 0.0)]
+    lines = [f"{0.4 + 0.02 * i}, 0.1, 0.4, 0, {c}, {s}, 0" for i, (s, c) in enumerate(turns)]
+    Path("weld.csv").write_text("\n".join(["x, y, z, qw, qx, qy, qz", *lines]))
+    assert main([*WELD, "--bodies", "off", "--speed", "0.1"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "It cannot be driven: no start reaches all of it" in text
+    assert re.search(
+        r"It can, in [\d.]+ s, if the tool may turn about its z axis: --task axis, or task = \"axis\"", text
+    )
+    assert main([*WELD, "--bodies", "off", "--speed", "0.1", "--task", "axis"]) == 0
+    assert "It can be driven as it is" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("width", [80, 100])
+def test_tables_fit_the_terminal(width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(command("ur10", "--acceleration", "20")) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(len(line) for line in lines if not line.startswith("start = ")) <= width

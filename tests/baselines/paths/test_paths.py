@@ -7,9 +7,10 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.paths import retime, survey
-from baselines.paths.motion import path_duration
+from baselines.paths import Branch, retime, survey
+from baselines.paths.motion import ideal, path_duration, played
 from baselines.paths.survey import FOLLOWED, REACHED
+from baselines.paths.timing import Timing
 from docs.retimed import PATHS, by_one_factor, faster
 from ikgym.exceptions import InvalidInputError
 
@@ -81,3 +82,36 @@ def test_a_path_that_nothing_follows_closely():
     retimed = retime(found)
     assert FOLLOWED[0] < retimed.motion.position_error.max() <= REACHED[0]
     assert baselines.track(retimed.scenario, "qp").position_error.max() <= REACHED[0]
+
+
+def test_a_long_path_has_coarse_plays():
+    """Plays in 30 times the time have control periods that the gains of `qp` do not suit."""
+    scenario = ikgym.scenarios.get("panda-circle")
+    slow = scenario.replace(trajectory=Timing.uniform(path_duration(scenario), 200.0).of(scenario.trajectory), dt=0.5)
+    begin = slow.start_of()[None]
+    assert played(ideal(slow.replace(steps=None), start=begin[0]), begin).position_error.max() < 5e-3
+
+
+def test_a_reserve_is_left_to_feedback():
+    scenario = faster("tiago-fast", 1)
+    less = retime(scenario, reserve=0.2)
+    check_driven(less)
+    assert less.share < 0.81
+    # Limits of the scenario that is written are those of the arm.
+    np.testing.assert_array_equal(less.scenario.arm.velocity_limit, scenario.arm.velocity_limit)
+    np.testing.assert_array_equal(less.scenario.velocity_limit, scenario.velocity_limit)
+    with pytest.raises(InvalidInputError, match="reserve: expected"):
+        survey(scenario, reserve=1.0)
+
+
+def test_a_joint_far_from_its_stop_comes_above_one_that_is_wound_up():
+    numbers = {"start": np.zeros(1), "given": False, "slowing": 1.0, "reached": 1.0, "leap": 0.0, "contact": None}
+    zero = dict.fromkeys(("velocity", "acceleration"), np.zeros(1))
+    error = dict.fromkeys(("position_error", "orientation_error"), 0.0)
+
+    def branch(room, shortest):
+        timings = {"shortest": Timing.uniform(shortest, 1.0), "asked": Timing.uniform(2.0, 1.0)}
+        return Branch(**numbers, **zero, **error, **timings, room=np.array([room]))
+
+    assert branch(0.8, 1.1).rank() < branch(0.3, 1.0).rank()
+    assert branch(0.9, 1.1).rank() > branch(1.9, 1.0).rank()
