@@ -2,71 +2,92 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import gc
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines.policy.protocol import Policy
-from baselines.recording import Episode, Seeds
+from baselines.recording import Episode, Recording, Seeds
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
+from ikgym.validation import FloatArray
 
 #: Steps between two calls of a :data:`Tick`.
 TICK = 100
-
-#: Chooses the actions of one step from the outcome of the step before. Shape (B, n), or (n,) for a single arm.
-Act = Callable[[Outcome], npt.NDArray[Any]]
 
 #: Reports progress: called between timed calls, with the number of steps since the last call.
 Tick = Callable[[int], object]
 
 
-def play(
-    scenario: Scenario,
-    seeds: Sequence[int | Seeds],
-    act: Act,
-    *,
-    preview: Preview,
-    single: bool = False,
-    commands: int = 0,
-) -> Iterator[Outcome]:
-    """Plays episodes in lockstep, from reset to end.
+class Stage(Protocol):
+    """Where a policy plays: arms in the simulator, or an environment."""
+
+    @property
+    def seen(self) -> Any:
+        """The observation."""
+
+    def step(self, action: npt.NDArray[Any]) -> Outcome:
+        """Makes one step; a later one does not change its outcome."""
+
+
+class Simulation:
+    """Arms side by side in the simulator, from their reset on.
 
     Args:
         scenario: The scenario.
         seeds: Seeds of the episodes, one an arm.
-        act: Chooses the actions of all arms; called before each step.
         preview: Steps ahead that the reference trajectory is shown, or which ones.
-        single: Whether there is one arm, and its actions have no batch axis.
+        single: Whether there is one arm, and observation and action have no batch axis.
         commands: Number of past commands that are shown.
-
-    Yields:
-        The outcome of each step, arrays with a leading axis of arms. The next step does not change them.
 
     Raises:
         InvalidInputError: The preview or the number of commands is invalid, or the plant draws no arm by seed.
     """
-    rows = len(seeds)
-    drawn = [Seeds.of(seed) for seed in seeds]
-    simulator = Simulator(scenario, None if single else rows, preview, commands=commands)
-    simulator.reset(
-        np.ones(rows, dtype=np.bool_),
-        [seeding.np_random(one.seed)[0] for one in drawn],
-        noise_seeds=[one.noise_seed for one in drawn],
-        **simulator.checked({"arm_seed": [one.arm_seed for one in drawn]}),
-    )
-    out = simulator.observe()
-    for _ in range(scenario.steps):
-        out = simulator.step(act(out))
-        yield out
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        seeds: Sequence[int | Seeds],
+        *,
+        preview: Preview,
+        single: bool = False,
+        commands: int = 0,
+    ) -> None:
+        drawn = [Seeds.of(seed) for seed in seeds]
+        self._row = 0 if single else None
+        self._simulator = Simulator(scenario, None if single else len(seeds), preview, commands=commands)
+        self._simulator.reset(
+            np.ones(len(seeds), dtype=np.bool_),
+            [seeding.np_random(one.seed)[0] for one in drawn],
+            noise_seeds=[one.noise_seed for one in drawn],
+            **self._simulator.checked({"arm_seed": [one.arm_seed for one in drawn]}),
+        )
+        self._outcome = self._simulator.observe()
+
+    @property
+    def seen(self) -> Any:
+        """The observation, without a row axis of a single arm."""
+        return observation(self._outcome, self._row)
+
+    @property
+    def true_q(self) -> FloatArray:
+        """True joint coordinates, in [rad] or [m]. Shape (N, n)."""
+        return self._simulator.true_q
+
+    def step(self, action: npt.NDArray[Any]) -> Outcome:
+        """Makes one step of all arms; its outcome has arrays with a leading axis of arms."""
+        self._outcome = self._simulator.step(action)
+        return self._outcome
 
 
 def rollout(
@@ -78,23 +99,7 @@ def rollout(
     timed: bool = True,
     tick: Tick | None = None,
 ) -> Episode:
-    """Plays one episode.
-
-    Bit-identical to `gym.make("RedundantIK-v0", scenario=…)`, reset with the seed and stepped with the policy; without
-    Gymnasium's wrappers and the float32 rewards of Stable-Baselines3.
-
-    Args:
-        scenario: The scenario.
-        policy: The policy.
-        seed: The reset seed, or all seeds of the episode.
-        preview: Steps ahead that the policy is shown; its own if left out.
-        timed: Whether the calls are timed.
-        tick: Reports progress.
-
-    Raises:
-        InvalidInputError: The preview is invalid or shorter than the policy needs; an action is not finite or has a
-            wrong shape.
-    """
+    """Plays one episode, see :func:`rollouts`."""
     return rollouts(scenario, policy, [seed], preview=preview, timed=timed, tick=tick)[0]
 
 
@@ -106,58 +111,60 @@ def rollouts(
     preview: Preview | None = None,
     timed: bool = False,
     tick: Tick | None = None,
+    in_a_row: int = 1,
+    begin: Callable[..., Stage] = Simulation,
 ) -> list[Episode]:
-    """Plays several episodes, with one call of the policy for all of them in each step where that is possible.
+    """Plays episodes, with one call of the policy for all of them in each step where that is possible.
 
-    The arguments are those of :func:`rollout`. Timed, or with a policy that takes no batch, it plays one episode after
-    the other. Progress counts the steps of all episodes.
-
-    Returns:
-        The same for each seed as :func:`rollout` gives, bit for bit.
-
-    Raises:
-        InvalidInputError: See :func:`rollout`.
-    """
-    chains = [[seed] for seed in seeds]
-    return [episode for (episode,) in sequences(scenario, policy, chains, preview=preview, timed=timed, tick=tick)]
-
-
-def sequences(
-    scenario: Scenario,
-    policy: Policy,
-    chains: Sequence[Sequence[int | Seeds]],
-    *,
-    preview: Preview | None = None,
-    timed: bool = False,
-    tick: Tick | None = None,
-) -> list[list[Episode]]:
-    """Plays sequences of episodes; the policy keeps its state from one episode to the next.
-
-    `predict` receives `episode_start` where the next episode begins. So a policy can use in later episodes the
-    arm that it has learned; memory that does not survive `episode_start` is cleared.
+    Bit-identical to `gym.make("RedundantIK-v0", scenario=…)`, reset with each seed and stepped with the policy; without
+    Gymnasium's wrappers and the float32 rewards of Stable-Baselines3. Timed, or with a policy that takes no batch, one
+    episode is played after the other.
 
     Args:
         scenario: The scenario.
         policy: The policy.
-        chains: The seeds of each sequence, all of one length.
-        preview: As in :func:`rollout`.
-        timed: As in :func:`rollouts`.
-        tick: As in :func:`rollouts`.
-
-    Returns:
-        The episodes of each sequence.
+        seeds: The reset seed of each episode, or all of its seeds.
+        preview: Steps ahead that the policy is shown; its own if left out.
+        timed: Whether the calls are timed.
+        tick: Reports progress, the steps of all episodes.
+        in_a_row: Number of episodes that follow one another, so that the policy keeps its state: it can use in later
+            ones the arm that it has learned. `predict` receives `episode_start` where the next one begins; memory that
+            does not survive it is cleared.
+        begin: Begins episodes, with the arguments of :class:`Simulation`.
 
     Raises:
-        InvalidInputError: See :func:`rollout`.
+        InvalidInputError: The preview is invalid or shorter than the policy needs; an action is not finite or has a
+            wrong shape.
     """
     single = timed or not policy.batched
-    out: list[list[Episode]] = []
+    shown: dict[str, Any] = {"preview": policy.preview if preview is None else preview, "commands": policy.commands}
+    chains = [seeds[first : first + in_a_row] for first in range(0, len(seeds), in_a_row)]
+    out: list[Episode] = []
     for group in [[chain] for chain in chains] if single else [chains]:
-        played, state = [], None
-        for seeds in zip(*group, strict=True):
-            episodes, state = _play(scenario, policy, seeds, preview, tick, single=single, timed=timed, state=state)
-            played.append(episodes)
-        out += [list(episodes) for episodes in zip(*played, strict=True)]
+        state, played = None, []
+        for together in zip(*group, strict=True):
+            stage, record = begin(scenario, together, single=single, **shown), Recording(scenario, len(together))
+            # A policy without a state knows that an episode begins.
+            start: dict[str, Any] = {} if state is None else {"episode_start": np.ones(len(together), dtype=np.bool_)}
+            with _no_garbage_collection():
+                for step in range(scenario.steps):
+                    seen = stage.seen
+                    if step == 0:
+                        # Compilation, caches and first touch of memory belong to no step: one call does not count.
+                        policy.predict(copy.deepcopy(seen))
+                    before = time.perf_counter_ns()
+                    action, state = policy.predict(seen, state, **({} if step else start))
+                    after = time.perf_counter_ns()
+                    check_finite(action, policy, scenario, together, step)
+                    record.keep(step, stage.step(action), policy.report(state), policy.diagnostics(state))
+                    if timed:
+                        record.time_ns.append(after - before)
+                    if tick is not None and (step + 1) % TICK == 0:
+                        tick(TICK * len(together))
+            if tick is not None:
+                tick(scenario.steps % TICK * len(together))
+            played.append(record.episodes())
+        out += [episode for chain in zip(*played, strict=True) for episode in chain]
     return out
 
 
@@ -187,87 +194,12 @@ def check_finite(
     )
 
 
-def _play(
-    scenario: Scenario,
-    policy: Policy,
-    seeds: Sequence[int | Seeds],
-    preview: Preview | None,
-    tick: Tick | None,
-    *,
-    single: bool,
-    timed: bool,
-    state: Any,
-) -> tuple[list[Episode], Any]:
-    """Episodes side by side, and the last state of the policy; `state` is that of the episodes before, or None."""
-    rows, steps = len(seeds), scenario.steps
-    record: dict[str, npt.NDArray[Any]] = {}
-    diagnostics: dict[str, npt.NDArray[Any]] = {}
-    time_ns = np.empty(steps if timed else 0, dtype=np.int64)
-    clock = time.perf_counter_ns
-    # A policy without a state knows that an episode begins.
-    start = {} if state is None else {"episode_start": np.ones(rows, dtype=np.bool_)}
-    step = 0
-
-    def act(out: Outcome) -> npt.NDArray[Any]:
-        nonlocal state
-        seen = observation(out, 0 if single else None)
-        if step == 0:
-            # Compilation, caches and first touch of memory belong to no step: one call on a copy, its answer dropped.
-            policy.predict({key: value.copy() for key, value in seen.items()})
-        begin = clock()
-        action, state = policy.predict(seen, state, **({} if step else start))
-        end = clock()
-        if timed:
-            time_ns[step] = end - begin
-        check_finite(action, policy, scenario, seeds, step)
-        return action
-
-    def keep(into: dict[str, npt.NDArray[Any]], values: Mapping[str, npt.NDArray[Any]]) -> None:
-        for name, value in values.items():
-            if name not in into:
-                into[name] = np.empty((rows, steps, *value.shape[1:]), dtype=value.dtype)
-            into[name][:, step] = value
-
+@contextlib.contextmanager
+def _no_garbage_collection() -> Iterator[None]:
     collecting = gc.isenabled()
     gc.disable()
     try:
-        shown = policy.preview if preview is None else preview
-        for out in play(scenario, seeds, act, preview=shown, single=single, commands=policy.commands):
-            report = policy.report(state)
-            keep(
-                record,
-                {
-                    "q": out.true_q,
-                    "qdot": out.qdot,
-                    "pose": out.true_pose,
-                    "tracking_cost": out.tracking_cost,
-                    "velocity_cost": out.velocity_cost,
-                    "position_error": out.position_error,
-                    "orientation_error": out.orientation_error,
-                    "at_limit": out.at_limit,
-                    "status": report.status,
-                    "iterations": report.iterations,
-                },
-            )
-            if scenario.collides:
-                keep(record, {"clearance": out.clearance, "pair": out.pair, "stopped": out.stopped})
-            if scenario.proximity is not None:
-                keep(record, {"proximity_cost": out.proximity_cost})
-            keep(diagnostics, policy.diagnostics(state))
-            step += 1
-            if tick is not None and step % TICK == 0:
-                tick(TICK * rows)
+        yield
     finally:
         if collecting:
             gc.enable()
-    if tick is not None:
-        tick(steps % TICK * rows)
-    episodes = [
-        Episode(
-            **{name: values[row] for name, values in record.items()},
-            time_ns=time_ns,
-            diagnostics={name: values[row] for name, values in diagnostics.items()},
-        )
-        for row in range(rows)
-    ]
-    return episodes, state

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy.arguments import Report
+from ikgym.kernels.simulation import Outcome
+from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 
@@ -29,6 +33,10 @@ class Seeds(NamedTuple):
     def of(cls, seed: int | Seeds) -> Seeds:
         """The seeds of a reset seed alone; seeds are returned as they are."""
         return seed if isinstance(seed, Seeds) else cls(seed)
+
+
+#: Parts of an outcome that the record of an episode has under the same name.
+_OUTCOME = ("qdot", "tracking_cost", "velocity_cost", "position_error", "orientation_error", "at_limit")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -78,6 +86,50 @@ class Episode:
         """The stage costs. Shape (steps,)."""
         cost: FloatArray = self.tracking_cost + self.velocity_cost
         return cost if self.proximity_cost is None else cost + self.proximity_cost
+
+
+class Recording:
+    """The record of episodes side by side, while they are played.
+
+    Args:
+        scenario: The scenario.
+        rows: Number of episodes.
+
+    Attributes:
+        time_ns: Wall times of the calls of `predict`, in [ns], of one episode whose calls are timed.
+    """
+
+    def __init__(self, scenario: Scenario, rows: int) -> None:
+        self._scenario, self._rows = scenario, rows
+        self._record: dict[str, npt.NDArray[Any]] = {}
+        self._diagnostics: dict[str, npt.NDArray[Any]] = {}
+        self.time_ns: list[int] = []
+
+    def keep(self, step: int, out: Outcome, report: Report, diagnostics: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Keeps the outcome of a step, counted from 0, and what the policy reports."""
+        values = {name: getattr(out, name) for name in _OUTCOME}
+        values |= {"q": out.true_q, "pose": out.true_pose, "status": report.status, "iterations": report.iterations}
+        if self._scenario.collides:
+            values |= {"clearance": out.clearance, "pair": out.pair, "stopped": out.stopped}
+        if self._scenario.proximity is not None:
+            values["proximity_cost"] = out.proximity_cost
+        for into, arrays in ((self._record, values), (self._diagnostics, diagnostics)):
+            for name, array in arrays.items():
+                if name not in into:
+                    into[name] = np.empty((self._rows, self._scenario.steps, *array.shape[1:]), dtype=array.dtype)
+                into[name][:, step] = array
+
+    def episodes(self) -> list[Episode]:
+        """The episodes."""
+        times = np.array(self.time_ns, dtype=np.int64)
+        return [
+            Episode(
+                **{name: values[row] for name, values in self._record.items()},
+                time_ns=times,
+                diagnostics={name: values[row] for name, values in self._diagnostics.items()},
+            )
+            for row in range(self._rows)
+        ]
 
 
 def add_up(costs: FloatArray) -> FloatArray:

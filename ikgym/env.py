@@ -199,6 +199,11 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
         self._has_orientation = self.scenario.task.has_orientation
 
     @property
+    def simulator(self) -> Simulator:
+        """The arm with its true state, which no observation shows."""
+        return self._simulator
+
+    @property
     def context(self) -> FloatArray:
         """Numbers that the plant has drawn from ranges, see :class:`ikgym.plant.DrawnPlant`. Shape (c,)."""
         context: FloatArray = self._simulator.context[0].copy()

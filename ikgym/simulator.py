@@ -214,7 +214,7 @@ class Simulator:
             where bodies can touch, the clearance in [m], 1 for an arm that is stopped, and Φ^C, else nothing.
         """
         take_actions(action, self._action_shape, self._all, self._state.actions)
-        numbers = np.empty(self._count)
+        self._numbers = numbers = np.empty(self._count)
         if self._motions and (made := int(self._state.step[0])) >= self._ready:
             self._ready = made + AT_ONCE
             motions.complete(*self._motions, self._all, True, AT_ONCE, 0, 1)
@@ -243,6 +243,11 @@ class Simulator:
         boxes, step = self._plant.contacts.boxes, int(self._state.step[row])
         now: FloatArray = boxes[row % len(boxes), min(step, boxes.shape[1] - 1)]
         return now
+
+    @property
+    def outcome(self) -> Outcome:
+        """All of the last step that :meth:`step_one` has made."""
+        return self._outcome(self._numbers)
 
     @property
     def true_q(self) -> FloatArray:

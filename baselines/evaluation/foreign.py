@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
@@ -11,12 +10,14 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Tick, check_finite, rollout
+from baselines.episodes import Simulation
 from baselines.policy import Report
-from baselines.recording import Episode, Seeds
+from baselines.recording import Seeds
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
+from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
 
@@ -80,7 +81,7 @@ class ForeignPolicy:
         if self.wrap is None:
             shown, needed = observation_space(scenario, self.preview), action_space(scenario)
         else:
-            env, _ = self.environment(scenario)
+            env = self.environment(scenario)
             shown, needed = env.observation_space, env.action_space
         for kind, own, there in (
             ("observations", getattr(self.model, "observation_space", None), shown),
@@ -90,94 +91,66 @@ class ForeignPolicy:
                 return f"{self.name} has {kind} of the shape {_shapes(own)}, the environment of {_shapes(there)}."
         return None
 
-    def environment(self, scenario: Scenario) -> tuple[gym.Env[Any, Any], Recorder]:
-        """The environment in its wrappers, and the recorder inside of them."""
+    def environment(self, scenario: Scenario) -> gym.Env[Any, Any]:
+        """The environment in its wrappers."""
         assert self.wrap is not None
         made = gym.make("RedundantIK-v0", scenario=scenario, preview=self.preview, disable_env_checker=True)
-        recorder = Recorder(made)
         try:
-            env = self.wrap(recorder)
+            env = self.wrap(made)
         except Exception as e:  # whatever the user's code raises
             raise InvalidInputError(f"wrap: raised {type(e).__name__} on {scenario.name}: {e}.") from e
         if not isinstance(env, gym.Env) or env.unwrapped is not made.unwrapped:
             raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
-        return env, recorder
+        return env
 
 
-class Recorder(gym.Wrapper[Any, Any, Any, Any]):
-    """Records the actions that reach an environment through other wrappers, and their tracking costs."""
-
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        super().__init__(env)
-        self.seeds: list[int | None] = []
-        self.actions: list[npt.NDArray[Any]] = []
-        self.costs: list[float] = []
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins the episode and records the seed."""
-        self.seeds.append(seed)
-        return self.env.reset(seed=seed, options=options)
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Makes one step and records it."""
-        result = self.env.step(action)
-        self.actions.append(np.array(action))
-        self.costs.append(result[-1]["tracking_cost"])
-        return result
-
-
-class _Recorded:
-    """Chooses recorded actions, one after the other."""
-
-    def __init__(self, actions: Sequence[npt.NDArray[Any]]) -> None:
-        self._actions = actions
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[Any, Any]:
-        """The action of the step; the state counts steps."""
-        del observation, episode_start, deterministic
-        step = state or 0
-        return self._actions[step], step + 1
-
-
-def play_wrapped(
-    scenario: Scenario, policy: ForeignPolicy, seed: int | Seeds, *, timed: bool = True, tick: Tick | None = None
-) -> Episode:
-    """Plays one episode in the wrapped environment. Its actions, played again without wrappers, give the record.
+class WrappedEnvironment:
+    """An episode in a wrapped environment; outcomes are those of the environment inside.
 
     Seeds other than the reset seed cannot be passed through wrappers.
+
+    Args:
+        policy: A policy that is played in wrappers.
+        scenario: The scenario.
+        seeds: The seeds of one episode.
+        **options: Those of :class:`baselines.episodes.Simulation`.
+
+    Raises:
+        InvalidInputError: The episode has other seeds; a wrapper raises, or changes the episode.
     """
-    seeds = Seeds.of(seed)
-    if seeds != Seeds(seeds.seed):
-        raise InvalidInputError(f"wrap: expected an episode that has no seed but the reset seed, got {seeds}.")
-    env, recorder = policy.environment(scenario)
-    seen, _ = env.reset(seed=seeds.seed)
-    if recorder.seeds != [seeds.seed] or recorder.actions:
-        raise InvalidInputError(
-            f"wrap: expected reset(seed={seeds.seed}) to reach the environment once and no step to be made, got resets "
-            f"with the seeds {recorder.seeds} and {len(recorder.actions)} steps."
-        )
-    state, times, over = None, [], False
-    while not over and len(recorder.actions) < scenario.steps:
-        begin = time.perf_counter_ns()
-        action, state = policy.predict(seen, state)
-        times.append(time.perf_counter_ns() - begin)
-        check_finite(action, policy, scenario, [seeds], len(recorder.actions))
-        seen, _, terminated, truncated, _ = env.step(action)
-        over = terminated or truncated
-    if len(recorder.actions) != scenario.steps:
-        raise InvalidInputError(
-            f"wrap: the episode of {scenario.name} ended after {len(recorder.actions)} of {scenario.steps} steps."
-        )
-    again = dataclasses.replace(policy, model=_Recorded(recorder.actions))
-    episode = rollout(scenario, again, seeds, timed=False, tick=tick)
-    if not np.array_equal(episode.tracking_cost, recorder.costs):
-        raise InvalidInputError(
-            f"wrap: expected the episode of {scenario.name} with seed {seeds.seed} from its start, got another one: a "
-            "wrapper resets with options or during the episode."
-        )
-    return dataclasses.replace(episode, time_ns=np.array(times if timed else [], dtype=np.int64))
+
+    def __init__(self, policy: ForeignPolicy, scenario: Scenario, seeds: Sequence[int | Seeds], **options: Any) -> None:
+        self._seeds = Seeds.of(seeds[0])
+        if self._seeds != Seeds(self._seeds.seed):
+            raise InvalidInputError(
+                f"wrap: expected an episode that has no seed but the reset seed, got {self._seeds}; sequences of "
+                "episodes are played without wrappers."
+            )
+        self._scenario, self._made = scenario, 0
+        self._env: gym.Env[Any, Any] = policy.environment(scenario)
+        self._arm: Simulator = self._env.unwrapped.simulator  # type: ignore[attr-defined]
+        self.seen, _ = self._env.reset(seed=self._seeds.seed)
+        start = Simulation(scenario, seeds, preview=1, single=True).true_q
+        self._check(self._env.np_random_seed == self._seeds.seed and np.array_equal(self._arm.true_q, start))
+
+    def step(self, action: npt.NDArray[Any]) -> Outcome:
+        """Makes one step."""
+        self.seen, _, terminated, truncated, _ = self._env.step(action)
+        self._made, out = self._made + 1, self._arm.outcome
+        self._check(int(out.remaining[0, 0]) == self._scenario.steps - self._made)
+        if (terminated or truncated) and self._made < self._scenario.steps:
+            raise InvalidInputError(
+                f"wrap: the episode of {self._scenario.name} ended after {self._made} of {self._scenario.steps} steps."
+            )
+        return out
+
+    def _check(self, same: bool) -> None:
+        if not same:
+            raise InvalidInputError(
+                f"wrap: expected the episode of {self._scenario.name} with seed {self._seeds.seed} from its start, got "
+                "another one: a wrapper resets without the seed, with options or during the episode, or its step does "
+                "not make one step."
+            )
 
 
 def _shapes(space: gym.Space[Any]) -> Any:

@@ -12,7 +12,6 @@ from baselines import registry
 from baselines.evaluation.foreign import Predictor, Wrap
 from baselines.evaluation.specification import Specification, shown_preview
 from baselines.policy import SolverPolicy
-from baselines.policy.protocol import Policy
 from baselines.recording import Seeds
 from baselines.spec import PolicySpec, parse_place, parse_policy
 from ikgym.exceptions import InvalidInputError
@@ -79,8 +78,8 @@ def specification(item: AnyPolicy, *, wrap: Wrap | None = None) -> Specification
 
 def bind(
     policy: AnyPolicy, scenario: Scenario, seeds: Seeds, preview: Preview | None = None, wrap: Wrap | None = None
-) -> tuple[Policy, Preview, Specification]:
-    """A policy for one episode, the steps ahead that it is shown, and its specification.
+) -> tuple[Specification, dict[str, Any], Preview]:
+    """The specification of a policy for one episode, its parameters, and the steps ahead that it is shown.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
@@ -90,7 +89,7 @@ def bind(
     if reason := one.unsuited(scenario, seeds, preview):
         raise InvalidInputError(f"{one.name} does not suit {scenario.name}: {reason}")
     bound = one.bind(scenario, one.given(scenario, seeds), preview)
-    return bound, shown_preview(bound, preview), one
+    return one, one.parameters(scenario, bound), shown_preview(bound, preview)
 
 
 def check_picklable(all_of: Iterable[Specification]) -> None:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-from collections.abc import Callable, Iterable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
+
+from tqdm import tqdm
+from tqdm.contrib.logging import logging_redirect_tqdm
 
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
-from baselines.evaluation.play import run
+from baselines.evaluation.play import Batch, play, play_elsewhere, split
+from baselines.evaluation.play import Results as PlayedJobs
 from baselines.evaluation.policies import ALL, AnyPolicy
 from baselines.evaluation.results import PAGE, Results, Rows
 from baselines.files import locked, write
 from baselines.workers import Workers
+from ikgym.kernels.compilation import logger
 from ikgym.scenarios import Scenario
 
 
@@ -74,11 +80,22 @@ def carry_out(
         results = None if options.out is None else Results(options.out, jobs, describe(), options)
         left = [job for job in jobs if results is None or not results.done(job)]
         rows = {} if results is None else {row.key: row for row in results.rows}
-        with contextlib.closing(run(left, workers, progress=options.progress)) as played:
-            for batch, some in played:
-                rows.update({row.key: row for row, _ in some})
+        away, here = split(left, workers)
+        with _progress(left, shown=options.progress) as (bar, announce):
+
+            def keep(batch: Batch, played: PlayedJobs) -> None:
+                rows.update({row.key: row for row, _ in played})
                 if results is not None:
-                    results.add(batch, some)
+                    results.add(batch, played)
+
+            with contextlib.closing(play_elsewhere(away, workers)) as all_played:
+                for batch, played in all_played:
+                    announce(batch)
+                    bar.update(sum(job.scenario.steps for job in batch))
+                    keep(batch, played)
+            for batch in here:
+                announce(batch)
+                keep(batch, play(batch, bar.update))
         if results is not None:
             skipped += results.not_exported
         out = Rows([rows[job.key] for job in jobs], skipped)
@@ -87,6 +104,31 @@ def carry_out(
         if results is not None:
             _finish(results, out, jobs, options, command)
         return out
+
+
+@contextlib.contextmanager
+def _progress(jobs: Sequence[Job], *, shown: bool) -> Iterator[tuple[Any, Callable[[Batch], None]]]:
+    """A progress bar on stderr that counts steps, and a function that names the batch which is played."""
+    bar = tqdm(
+        total=sum(job.scenario.steps for job in jobs),
+        disable=not shown or not jobs,
+        file=sys.stderr,
+        unit="step",
+        unit_scale=True,
+        dynamic_ncols=True,
+        # A log file has no cursor to go back with.
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,
+    )
+    done = 0
+
+    def announce(batch: Batch) -> None:
+        nonlocal done
+        done += len(batch)
+        bar.set_description(f"{batch[0].scenario.name} · {batch[0].policy} ({done}/{len(jobs)})", refresh=False)
+
+    # Messages, such as those on compilation, stand above the bar.
+    with bar, contextlib.nullcontext() if bar.disable else logging_redirect_tqdm([logger]):
+        yield bar, announce
 
 
 def _finish(results: Results, rows: Rows, jobs: Sequence[Job], options: Options, command: str) -> None:

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
+from baselines.evaluation.jobs import Job
 from baselines.evaluation.motion.free_timing import as_long
 from baselines.evaluation.motion.message import joint_trajectory, mcap
 from baselines.evaluation.motion.played import Motion, by_joint
-from baselines.evaluation.play import play_episodes
+from baselines.evaluation.play import play
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy, bind
 from baselines.files import write
@@ -160,9 +160,10 @@ def track(
         found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
     whole_number("seed", seed, at_least=0)
     seeds = Seeds(seed)
-    bound, shown, one = bind(policy, found, seeds, preview, wrap)
-    with threadpool_limits(limits=1):
-        (episode,) = play_episodes(found, bound, [seeds], shown, timed=True)
+    one, parameters, shown = bind(policy, found, seeds, preview, wrap)
+    job = Job(found, one, parameters, seeds, first=True, record=True, timed=True, preview=shown)
+    ((row, episode),) = play((job,))
+    assert episode is not None  # since the job asks for it
     found = as_long(found, episode)
     names = ("q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost")
     arrays: dict[str, Any] = {name: getattr(episode, name) for name in names}
@@ -170,4 +171,4 @@ def track(
     arrays["nominal"] = found.nominal(seed)[1:]
     arrays["statuses"] = episode.status
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    return Tracking(found.name, one.name, one.parameters(found, bound), seed, **kept, _played=(found, seeds, episode))
+    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _played=(found, seeds, episode))

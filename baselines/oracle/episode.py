@@ -6,11 +6,10 @@ import dataclasses
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from baselines.episodes import play
-from baselines.policy import Memory, SolverPolicy
+from baselines.episodes import Simulation, rollouts
+from baselines.policy import SolverPolicy
 from baselines.recording import add_up
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
@@ -18,8 +17,6 @@ from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.solvers.surroundings import swept
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.outcome import observation
-from ikgym.kernels.simulation import Outcome
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, read_only, whole_number
@@ -180,10 +177,10 @@ class EpisodeProblem:
             Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost; infinite where
             bodies touch at a step or between two, so that the arm is stopped.
         """
-        actions = iter(qdot / self.scenario.velocity_limit)
-        played = play(self.scenario, [self.seed], lambda _: next(actions), preview=1, single=True)
+        simulation = Simulation(self.scenario, [self.seed], preview=1, single=True)
         q, costs, stopped = np.empty_like(qdot), np.empty(len(qdot)), False
-        for k, out in enumerate(played):
+        for k, action in enumerate(qdot / self.scenario.velocity_limit):
+            out = simulation.step(action)
             q[k], costs[k] = out.true_q[0], out.cost[0]
             stopped = stopped or bool(out.stopped.any())
         return q, np.inf if stopped else float(add_up(costs))
@@ -191,14 +188,7 @@ class EpisodeProblem:
 
 def path_of(policy: SolverPolicy, scenario: Scenario, seed: int) -> FloatArray:
     """The joint coordinates of an episode that a policy plays, in [rad] or [m]. Shape (steps, n)."""
-    state: Memory | None = None
-
-    def act(out: Outcome) -> npt.NDArray[np.float32]:
-        nonlocal state
-        action, state = policy.predict(observation(out), state)
-        return action
-
-    return np.stack([out.true_q[0] for out in play(scenario, [seed], act, preview=policy.preview)])
+    return rollouts(scenario, policy, [seed])[0].q
 
 
 def _clearance(scenario: Scenario, seed: int) -> Clearance | None:

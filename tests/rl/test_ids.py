@@ -16,7 +16,7 @@ from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, Re
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 
 import ikgym
-from baselines.episodes import play
+from baselines.episodes import Simulation
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
 from ikgym.rl.task import steps_ahead
@@ -97,10 +97,11 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
     actions = actions_of(env, 30) * 0.2
     env.reset(seed=11)
     infos = [env.step(action)[-1] for action in actions]
-    fractions = iter(actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit))
+    fractions = actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit)
     ahead = steps_ahead(task.ahead, scenario.dt)
-    outcomes = play(scenario, [11], lambda _: next(fractions)[None], preview=ahead, commands=task.commands)
-    for info, out in zip(infos, outcomes, strict=False):
+    simulation = Simulation(scenario, [11], preview=ahead, commands=task.commands)
+    for info, action in zip(infos, fractions, strict=True):
+        out = simulation.step(action[None])
         assert info["tracking_cost"] == out.tracking_cost[0]
         assert info["velocity_cost"] == out.velocity_cost[0]
 

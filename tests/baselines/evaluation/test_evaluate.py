@@ -211,15 +211,15 @@ def test_series_are_the_trajectory_log_of_the_first_episode_at_the_steps_that_co
 
 
 def interrupted(monkeypatch, after):
-    play_jobs = module.run
+    play, played = module.play, []
 
-    def run(jobs, workers, **options):
-        for number, outcomes in enumerate(play_jobs(jobs, workers, **options)):
-            if number == after:
-                raise KeyboardInterrupt
-            yield outcomes
+    def interrupt(batch, tick):
+        if len(played) == after:
+            raise KeyboardInterrupt
+        played.append(batch)
+        return play(batch, tick)
 
-    monkeypatch.setattr(module, "run", run)
+    monkeypatch.setattr(module, "play", interrupt)
 
 
 # One episode of each policy is timed. The others of dls and moore_penrose are one batch, those of the reference two.

@@ -206,7 +206,7 @@ def test_the_log_has_the_accelerations_of_the_steps_from_rest():
 def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch):
     given = {"scenarios": "faitli3-regular", "steps": 5, "out": tmp_path}
     evaluate(**given, policies="dls")
-    monkeypatch.setattr(run, "run", None)
+    monkeypatch.setattr(run, "play", None)
     (file,) = tmp_path.glob("series/*/*.npz")
     with np.load(file) as arrays:
         log = dict(arrays)

@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout, sequences
+from baselines.episodes import rollout, rollouts
 from baselines.evaluate import evaluate
 from baselines.evaluation.play import batches, play
 from baselines.policy import Solution, SolverPolicy, statuses
@@ -41,20 +41,20 @@ class Counting(SolverPolicy):
 
 @pytest.mark.parametrize("timed", [True, False])
 def test_the_state_is_handed_on(timed):
-    draws = [[Seeds(seed, 0) for seed in range(3)]]
+    draws = [Seeds(seed, 0) for seed in range(3)]
     policy = Counting.for_scenario(SAME_ARM)
-    ((first, second, third),) = sequences(SAME_ARM, policy, draws, timed=timed)
-    assert identical(first.q, rollout(SAME_ARM, policy, draws[0][0], timed=False).q)
-    for episode, draw, times in ((second, draws[0][1], 2.0), (third, draws[0][2], 3.0)):
+    first, second, third = rollouts(SAME_ARM, policy, draws, timed=timed, in_a_row=3)
+    assert identical(first.q, rollout(SAME_ARM, policy, draws[0], timed=False).q)
+    for episode, draw, times in ((second, draws[1], 2.0), (third, draws[2], 3.0)):
         fresh = rollout(SAME_ARM, policy, draw, timed=False)
         np.testing.assert_allclose(episode.qdot[0] * times, fresh.qdot[0], rtol=1e-5)
 
 
 def test_what_does_not_survive_is_cleared():
-    draws = [[Seeds(seed, 0) for seed in range(2)]]
+    draws = [Seeds(seed, 0) for seed in range(2)]
     policy = baselines.make("rhc", SAME_ARM, horizon=3)
-    ((*_, last),) = sequences(SAME_ARM, policy, draws)
-    assert identical(last.q, rollout(SAME_ARM, policy, draws[0][1], timed=False).q)
+    _, last = rollouts(SAME_ARM, policy, draws, in_a_row=2)
+    assert identical(last.q, rollout(SAME_ARM, policy, draws[1], timed=False).q)
 
 
 def jobs_of(episodes=7, **options):
@@ -109,5 +109,5 @@ def test_wrapped_environments_play_no_sequences():
 
     wrapped = planned(SAME_ARM, Agent(), episodes=2, preview=1, wrap=lambda env: env).jobs[1]
     assert wrapped.before == job.before
-    with pytest.raises(InvalidInputError, match="in sequences of episodes, without wrappers"):
+    with pytest.raises(InvalidInputError, match="sequences of episodes are played without wrappers"):
         play([wrapped])
