@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from baselines.canonical import canonical, jsonable
-from ikgym.arms import Arm
+from ikgym.arms import Arm, Bodies
 from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
@@ -77,6 +77,8 @@ def _canonical(value: Any) -> Any:
         if isinstance(value, Arm):
             # Home posture and names of joints move nothing, nor do bodies, where touching does not matter.
             del fields["home"], fields["joint_names"], fields["bodies"]
+        if isinstance(value, Bodies):
+            del fields["unseen"]  # nothing, wherever touching matters
         if isinstance(value, Arm) and not value.limited:
             # A plant without limits keeps the digest that it had before there were limits.
             del fields["acceleration_limit"]

@@ -33,11 +33,24 @@ class RobotOptions:
     acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
     """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
 
+    packages: Annotated[tuple[str, ...], tyro.conf.arg(metavar="DIR …")] = ()
+    """Folders in which packages of meshes are searched, before those above the URDF file."""
+    bodyless: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LINK …")] = ()
+    """Links that need no body, since they may touch."""
+
     def robot(self, name: str) -> Arm:
         """The arm of a URDF file, or of the catalogue by its name."""
-        urdf = name.endswith(".urdf")
+        if not name.endswith(".urdf"):
+            return self.accelerated(arms.get(name))
         return self.accelerated(
-            arms.from_urdf(name, base=self.base, tip=self.tip, tool=self.tool) if urdf else arms.get(name)
+            arms.from_urdf(
+                name,
+                base=self.base,
+                tip=self.tip,
+                tool=self.tool,
+                packages=self.packages,
+                bodyless=self.bodyless,
+            )
         )
 
     def accelerated(self, arm: Arm) -> Arm:
@@ -49,7 +62,7 @@ class RobotOptions:
 
 
 #: The names of these options.
-ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--acceleration")
+ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--packages", "--bodyless", "--acceleration")
 TOOL = "--tool-acceleration"
 
 
@@ -74,11 +87,27 @@ class OwnPath(RobotOptions):
     """Control period in [s]: 0.004 by default, or that of the scenario."""
 
 
-_WITH_CSV = (*ROBOT_OPTIONS[:3], "--speed", TOOL, "--corner-radius", "--task")
+_WITH_CSV = (*ROBOT_OPTIONS[:5], "--speed", TOOL, "--corner-radius", "--task")
 RULES = (
     Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),
-    Rule(ROBOT_OPTIONS[:3], lambda given: (given.arm or "").endswith(".urdf"), "without a URDF file"),
+    Rule(ROBOT_OPTIONS[:5], lambda given: (given.arm or "").endswith(".urdf"), "without a URDF file"),
 )
+
+
+def describe_bodies(arm: Arm) -> str:
+    """The links of an arm that have bodies, what these were made from, and the links that have none."""
+    shapes = () if arm.urdf is None else arm.urdf.shapes
+    parts = [f"{len(arm.bodies)} on the arm, {len(arm.bodies.pairs)} pairs of which can meet"]
+    if meshes := [one for one in shapes if "mesh" in one.source]:
+        larger = ", ".join(f"{one.link} {one.covered / one.volume:.2g}" for one in meshes)
+        parts.append(f"around meshes, in times the volume of the hull: {larger}")
+    if others := [one.link for one in shapes if "mesh" not in one.source]:
+        parts.append(f"from shapes of the file: {', '.join(others)}")
+    if arm.urdf is not None and arm.urdf.bodyless:
+        parts.append(f"stated to be bodyless: {', '.join(arm.urdf.bodyless)}")
+    if arm.bodies.unseen:
+        parts.append(f"NOT LOOKED AT: {'; '.join(arm.bodies.unseen)}")
+    return "; ".join(parts if len(arm.bodies) else ["none", *parts[1:]])
 
 
 def scenario_of(options: OwnPath) -> Scenario:

@@ -226,9 +226,11 @@ class Arm(Frozen):
             obstacle; -1 where nothing can meet. Shape (..., 2).
 
         Raises:
-            InvalidInputError: q has the wrong length or is not finite.
+            InvalidInputError: q has the wrong length or is not finite, an obstacle is none, or a link was not looked
+                at, see :attr:`Bodies.unseen`.
             UnknownNameError: An obstacle ignores a body that there is not.
         """
+        self.bodies.check_seen(self.name)
         rows, lead = self._rows(q)
         distances, pairs = np.empty(len(rows)), np.empty((len(rows), 2), dtype=np.int64)
         around = self.bodies.surroundings(obstacles)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,7 @@ from ikgym.validation import (
 MOST_BODIES = 1000
 
 
+@runtime_checkable
 class Neighbour(Protocol):
     """The part of an obstacle that bodies need, see :mod:`ikgym.obstacles`."""
 
@@ -64,6 +65,8 @@ class Bodies(Frozen):
         ends: The other end, in [m]; the starts if left out. Shape (k, 3).
         radii: In [m], at least 1e-12. Shape (k,).
         ignored: Pairs of names whose bodies may touch.
+        unseen: Links that may have a shape, but no body that stands for it, each with the reason. Nothing can be said
+            about the clearance of an arm that has any.
 
     The bodies are sorted by link. Lengths are at most 1e12.
 
@@ -78,6 +81,7 @@ class Bodies(Frozen):
     ends: FloatArray = None  # type: ignore[assignment]  # the starts
     radii: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
     ignored: Sequence[Sequence[str]] = ()
+    unseen: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         names = different_texts("names of bodies", self.names)
@@ -97,6 +101,7 @@ class Bodies(Frozen):
             ends=read_only(ends[order]),
             radii=read_only(radii[order]),
             ignored=_pairs(self.ignored, names),
+            unseen=tuple(different_texts("unseen links of bodies", self.unseen)),
         )
 
     def __len__(self) -> int:
@@ -136,6 +141,23 @@ class Bodies(Frozen):
             radii=np.append(self.radii, radius),
             ignored=(*self.ignored, *((name, other) for other in ignored)),
         )
+
+    def check_seen(self, arm: str) -> None:
+        """Checks that each link that may have a shape has a body.
+
+        Args:
+            arm: Name of the arm in messages.
+
+        Raises:
+            InvalidInputError: A link has none; the message names it, the reason and the ways out.
+        """
+        if self.unseen:
+            links = ", ".join(text.partition(": ")[0] for text in self.unseen)
+            raise InvalidInputError(
+                f"bodies of arm {arm!r}: expected one on each link, got none on {links}. {self.unseen[0]}. Name the "
+                "folder of the meshes (packages, --packages DIR), add collision shapes to the file, or name the links "
+                "that may touch (bodyless, --bodyless LINK …)."
+            )
 
     def check(self, joints: int) -> None:
         """Checks that an arm with so many joints has the links.
@@ -178,8 +200,11 @@ class Bodies(Frozen):
             obstacles: The obstacles.
 
         Raises:
+            InvalidInputError: An obstacle is none.
             UnknownNameError: An obstacle ignores a body that there is not.
         """
+        if not isinstance(obstacles, (tuple, list)) or not all(isinstance(one, Neighbour) for one in obstacles):
+            raise InvalidInputError(f"obstacles: expected a list of obstacles, got {shortened(obstacles)}.")
         rows = [np.reshape(one.numbers(), (-1, OBSTACLE)) for one in obstacles]
         boxes, checked = np.concatenate([np.empty((0, OBSTACLE)), *rows]), []
         for one in obstacles:

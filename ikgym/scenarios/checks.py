@@ -58,6 +58,8 @@ def obstacles(fields: Mapping[str, Any]) -> tuple[Obstacle, ...]:
             f"keep clear, got a {type(path).__name__}."
         )
     matters = bool(given) if collisions is None else flag("collisions", collisions)
+    if matters:
+        arm.bodies.check_seen(arm.name)
     if matters and not len(arm.bodies):
         raise InvalidInputError(f"collisions of scenario {name!r}: expected an arm with bodies, {arm.name!r} has none.")
     _check_proximity(name, fields["proximity"], matters)

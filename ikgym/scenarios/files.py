@@ -22,6 +22,7 @@ from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import Obstacle
 from ikgym.plant import Plant
+from ikgym.scenarios.checks import MOST_OBSTACLES
 from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
 from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
@@ -70,6 +71,9 @@ def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -
     """The value of an argument with some annotation."""
     kind = _part(hint)
     if kind is not None and isinstance(value, list) and typing.get_origin(hint) is Sequence:
+        if kind is Obstacle and len(value) > MOST_OBSTACLES:
+            with located(where):
+                raise InvalidInputError(f"{name}: expected at most {MOST_OBSTACLES} tables, got {len(value)}.")
         return [_value(kind, name, one, folder, where) for one in value]
     with located(where):
         if kind is None or kind is Task or (hint is Arm and isinstance(value, str)):
@@ -101,7 +105,8 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
         make, given = arms.get, {"name": table["like"]}
         changes = {key: value for key, value in table.items() if key != "like"}
     elif "urdf" in table:
-        make, own = arms.from_urdf, ("name", "base", "tip", "tool", "tool_rotation", "meshes")
+        make = arms.from_urdf
+        own = ("name", "base", "tip", "tool", "tool_rotation", "meshes", "packages", "bodyless")
         with located(where):
             known_names("key", table, dict.fromkeys(("urdf", *own, *inspect.signature(Arm).parameters)))
         given = {"path": table["urdf"], **{key: table[key] for key in own if key in table}}
@@ -111,6 +116,11 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
     with located(where):
         if make is arms.from_urdf:
             given["path"] = folder / given["path"]
+            packages = given.get("packages")
+            if isinstance(packages, str):
+                given["packages"] = folder / packages
+            elif isinstance(packages, list):
+                given["packages"] = [folder / one if isinstance(one, str) else one for one in packages]
         arm = make(**given)
         return arm.replace(**changes) if changes else arm
 
@@ -202,7 +212,7 @@ def _plain(value: Any, folder: pathlib.Path) -> Any:
     fields = _fields(value, folder)
     if isinstance(value, Plant):
         return {name: fields[name] for name in value.switched_on()} or None
-    return fields if not isinstance(value, Bodies) or len(value) else None
+    return fields if not isinstance(value, Bodies) or len(value) or value.unseen else None
 
 
 def _fields(part: Any, folder: pathlib.Path) -> Table:
@@ -223,19 +233,25 @@ def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
     """A reference to the URDF file of an arm; None where there is none, or it has changed since."""
     if arm.urdf is None:
         return None
-    path, base, tip, tool, tool_rotation, meshes = arm.urdf
-    where: Table = {"base": base, "tip": tip, "tool": tool, "tool_rotation": tool_rotation}
-    if meshes:
-        where["meshes"] = True
+    names = ("base", "tip", "tool", "tool_rotation", "meshes", "packages", "bodyless")
+    where: Table = {name: getattr(arm.urdf, name) for name in names}
     try:
-        if not _same(arm, arms.from_urdf(path, name=arm.name, **where)):
+        if not _same(arm, arms.from_urdf(arm.urdf.file, name=arm.name, **where)):
             return None
-        name = os.path.relpath(path, folder.resolve())
     except IkgymError:
         return None
-    except ValueError:  # on another drive
-        name = str(path)
-    return {"name": arm.name, "urdf": pathlib.Path(name).as_posix(), **where}
+    where["meshes"] = where["meshes"] or None  # keys without a value are left out
+    where["packages"] = [_relative(one, folder) for one in where["packages"]] or None
+    where["bodyless"] = list(where["bodyless"]) or None
+    return {"name": arm.name, "urdf": _relative(arm.urdf.file, folder), **where}
+
+
+def _relative(path: pathlib.Path, folder: pathlib.Path) -> str:
+    """A path as it is seen from a folder; on another drive the path itself."""
+    try:
+        return pathlib.Path(os.path.relpath(path, folder.resolve())).as_posix()
+    except ValueError:
+        return path.as_posix()
 
 
 def _same(one: Arm, other: Arm) -> bool:

@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
+from ikgym.arms.urdf import open_meshes
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
@@ -55,7 +56,8 @@ class Scenario(Frozen, Surrounded):
         plant: Deviations of the arm, its drives and its sensors from the data sheet; none by default.
         obstacles: Obstacles that stand or move, at most 1000, with different names.
         collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
-            By default it is where there are obstacles.
+            By default it is where there are obstacles. The meshes of an arm from a URDF file are opened then, and each
+            link needs a body, see :attr:`Bodies.unseen`.
         proximity: The cost of bodies that come near, in a scenario with collisions; none by default.
         policy: A policy that follows the path closely, such as ``"sns"``: the default of commands that show episodes.
         source: Origin of the scenario.
@@ -89,6 +91,9 @@ class Scenario(Frozen, Surrounded):
         self._settle(model=self.arm if self.model is None else self.model)
         with about(f"Scenario {shortened(self.name)}"):
             super().__post_init__()
+        if self.collisions is True or (self.collisions is None and self.obstacles not in ((), [])):
+            arm = open_meshes(self.arm)
+            self._settle(model=arm if self.model is self.arm else self.model, arm=arm)
         checks.check_parts(self._fields())
         n = self.arm.joints
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))

@@ -2,6 +2,7 @@
 
 import logging
 from pathlib import Path
+from xml.etree.ElementTree import fromstring as xml_of
 
 import numpy as np
 import pinocchio as pin
@@ -10,8 +11,9 @@ import trimesh
 
 from ikgym.arms import Arm, from_urdf
 from ikgym.arms.urdf import bodies as urdf_bodies
+from ikgym.arms.urdf import geometry
 from ikgym.arms.urdf.covering import Capsule, around, around_box, distances
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.arms.test_urdf import LIMIT
 from tests.arms.test_urdf import joint as bare
 
@@ -131,7 +133,7 @@ def test_the_capsule_around_a_mesh_contains_its_corners_and_is_small():
     ("name", "kind"),
     [("package://some_robot/meshes/link", "stl"), *(("meshes/link", kind) for kind in ("obj", "ply", "dae"))],
 )
-def test_meshes_are_opened_where_they_are_asked_for(tmp_path, name, kind, caplog):
+def test_meshes_are_opened_where_they_are_asked_for(tmp_path, name, kind):
     folder = tmp_path / "some_robot"
     (folder / "meshes").mkdir(parents=True)
     mesh = trimesh.creation.cone(0.1, 0.5)
@@ -139,10 +141,9 @@ def test_meshes_are_opened_where_they_are_asked_for(tmp_path, name, kind, caplog
     inside = shape(f'<mesh filename="{name}.{kind}" scale="1 2 1"/>', "0.1 0 0", "0 0.5 0")
     path = folder / "arm.urdf"
     path.write_text(robot({"a": "", "b": inside}, [joint("j", "a", "b", xyz="0 0 1", rpy="0.3 0 0")]))
-    with caplog.at_level(logging.INFO, "ikgym"):
-        assert len(from_urdf(path).bodies) == 0
-    assert "1 meshes were not opened" in caplog.text
+    assert from_urdf(path).bodies.unseen == (f"'b': its mesh '{name}.{kind}' was not opened",)
     arm = from_urdf(path, meshes=True)
+    assert arm.bodies.unseen == ()
     assert arm.bodies.names == ("b",)
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0, 0), np.zeros(3)) * pin.SE3(
         pin.rpy.rpyToMatrix(0, 0.5, 0), np.array([0.1, 0, 0])
@@ -172,26 +173,119 @@ def test_pairs_that_always_touch_are_ignored_and_named(write, caplog):
 @pytest.mark.parametrize(
     ("geometry", "message"),
     [
-        ('<sphere radius="-1"/>', "link 'b': expected radius of <sphere> above 0, got '-1'"),
+        ('<sphere radius="-1"/>', "link 'b': expected radius of <sphere> from 0 to 1e+12 m, got '-1'"),
+        ('<box size="1 1e300 1"/>', "link 'b': expected size of <box> from 0 to 1e+12 m, got '1 1e300 1'"),
         ("<sphere/>", "link 'b': expected <sphere radius=\"…\">, got none"),
         ('<cylinder radius="1" length="nan"/>', "link 'b': expected length to be a finite number, got 'nan'"),
         ('<box size="1 2"/>', "link 'b': expected size to be 3 finite numbers"),
         ("<cone/>", "expected one of 'sphere', 'cylinder', 'capsule', 'box', 'mesh' in <geometry>, got 'cone'"),
         ("", "in <geometry>, got none"),
-        ('<mesh filename="package://no/such.stl"/>', "expected the mesh 'package://no/such.stl'"),
-        ('<mesh filename="arm.urdf"/>', "expected a mesh of kind .stl, .obj, .ply, .dae, got 'arm.urdf'"),
-        ('<mesh filename="bomb.dae"/>', "expected XML without a DOCTYPE in 'bomb.dae'"),
-        ('<mesh filename="broken.stl"/>', "link 'b': expected a mesh"),
     ],
 )
 def test_bad_geometry_is_refused(write, geometry, message):
     path = write(robot({"a": "", "b": shape(geometry)}, [joint("j", "a", "b")]))
-    path.with_name("broken.stl").write_bytes(b"no mesh")
-    path.with_name("bomb.dae").write_bytes(b'<!DOCTYPE lolz [<!ENTITY lol "lol">]><COLLADA/>')
     with pytest.raises(InvalidInputError) as caught:
-        from_urdf(path, meshes=True)
+        from_urdf(path)
     assert message in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "reason"),
+    [
+        ('filename="package://no/such.stl"', "its mesh 'package://no/such.stl' was not found from /"),
+        ('filename="arm.urdf"', "expected a mesh of kind .stl, .obj, .ply, .dae, got 'arm.urdf'"),
+        ('filename="bomb.dae"', "expected XML without a DOCTYPE in 'bomb.dae'"),
+        ('filename="broken.stl"', "its mesh 'broken.stl' cannot be read: "),
+        ('filename="cone.stl" scale="1 1e300 1"', "expected corners of at most 1e+12 m in 'cone.stl'"),
+    ],
+)
+def test_a_link_whose_mesh_cannot_be_opened_gets_no_verdict(write, mesh, reason):
+    path = write(robot({"a": "", "b": shape(f"<mesh {mesh}/>")}, [joint("j", "a", "b")]))
+    path.with_name("broken.stl").write_bytes(b"no mesh")
+    path.with_name("bomb.dae").write_bytes(b'<!DOCTYPE lolz [<!ENTITY lol "lol">]><COLLADA/>')
+    trimesh.creation.cone(0.1, 0.5).export(path.with_name("cone.stl"))
+    arm = from_urdf(path, meshes=True)
+    with pytest.raises(InvalidInputError) as caught:
+        arm.clearance([0.0])
+    for part in ("got none on 'b'", reason, "--packages DIR", "bodyless"):
+        assert part in str(caught.value)
+
+
+VISUAL = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
+
+
+@pytest.mark.parametrize(
+    ("link", "unseen"),
+    [
+        ("c", ("'c': it has a visual shape, but no collision shape",)),  # off the chain, and fixed to it
+        ("b", ("'b': it has a visual shape, but no collision shape",)),
+        ("d", ()),  # a finger, which a joint off the chain moves
+        ("a", ("'a': it has a visual shape, but no collision shape",)),
+    ],
+)
+def test_links_of_the_chain_and_links_fixed_to_them_need_a_body(write, link, unseen):
+    links = {name: shape('<sphere radius="0.1"/>') for name in "abcd"} | {link: VISUAL}
+    steps = [joint("j", "a", "b"), joint("k", "b", "c", "fixed"), joint("l", "b", "d", "prismatic")]
+    path = write(robot(links, steps))
+    assert from_urdf(path, tip="b").bodies.unseen == unseen
+    assert from_urdf(path, tip="b", bodyless=[link]).bodies.unseen == ()
+    assert link not in from_urdf(path, tip="b", bodyless=[link]).bodies.names
+
+
+def test_a_link_that_moves_alone_needs_a_body_and_a_frame_does_not(write):
+    ball = shape('<sphere radius="0.1"/>')
+    links = {"world": "", "one": ball, "two": "", "three": ball, "tool0": ""}
+    steps = [joint("j", "world", "one"), joint("k", "one", "two"), joint("l", "two", "three")]
+    path = write(robot(links, [*steps, joint("m", "three", "tool0", "fixed")]))
+    assert from_urdf(path).bodies.unseen == ("'two': it has no shape",)
+    with pytest.raises(UnknownNameError, match="Did you mean 'two'"):
+        from_urdf(path, bodyless=["tow"])
+
+
+def test_shapes_without_extent_are_left_out(write, caplog):
+    inside = shape('<sphere radius="0"/>') + shape('<cylinder radius="0.1" length="0"/>') + shape('<box size="1 0 1"/>')
+    arm = from_urdf(write(robot({"a": "", "b": inside + shape('<sphere radius="0.2"/>')}, [joint("j", "a", "b")])))
+    assert arm.bodies.radii.tolist() == [0.2]
+    assert caplog.text.count("is left out") == 3
+
+
+def test_many_shapes_that_always_touch_are_found(write):
+    """Pair after pair they took a minute and a half."""
+    links = {name: "".join(shape('<sphere radius="0.1"/>', f"0 0 {i / 1e4}") for i in range(40)) for name in "abc"}
+    bodies = from_urdf(write(robot(links, [joint("j", "a", "b"), joint("k", "b", "c")]))).bodies
+    assert len(bodies.ignored) == 40 * 40
+    assert len(bodies.pairs) == 0
+
+
+def test_a_fine_mesh_is_covered_in_no_time():
+    """All of its corners are on its hull; a sample of them is searched, and all are inside."""
+    points = np.array(trimesh.creation.icosphere(subdivisions=6, radius=0.3).vertices)
+    capsule = around(points)
+    assert (distances(points, capsule.start, capsule.end) <= capsule.radius * (1 + 1e-12)).all()
+    assert capsule.radius < 0.31
+
+
+@pytest.mark.slow
+def test_capsules_contain_the_meshes_of_public_robots():
+    cmeel = pytest.importorskip("cmeel")
+    folder = Path(cmeel.__file__).parents[1] / "cmeel.prefix/share/example-robot-data/robots"
+    if not folder.is_dir():
+        pytest.skip("example-robot-data is not installed")
+    seen = 0
+    for name in ("panda_description", "ur_description", "kinova_description", "xarm_description", "tiago_description"):
+        for file in sorted(folder.glob(f"{name}/meshes/**/*.*")):
+            if file.suffix.lower() not in geometry.MESHES:
+                continue
+            try:
+                vertices = np.array(trimesh.load_mesh(file, process=False).vertices)
+                solid = geometry._mesh("link", xml_of(f'<mesh filename="{file}"/>'), [folder])
+            except (InvalidInputError, AttributeError, ValueError):
+                continue  # a damaged file, or one of points alone
+            (capsule,) = solid.capsules
+            assert (distances(vertices, capsule.start, capsule.end) - capsule.radius).max() < 1e-4, file
+            seen += 1
+    assert seen > 50
 
 
 def test_more_shapes_than_an_arm_may_have_are_refused(write):

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import ikgym
 from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from ikgym.scenarios import Scenario
 from ikgym.trajectories import Helix, Sinusoid, StraightLine
 from tests.comparison import fields, identical
 
@@ -82,3 +84,43 @@ def test_a_motion_of_joints_is_that_of_the_tool():
     rotation, position = ARM.forward(0.3 * np.sin(scenario.times(50))[:, None] + ARM.home)
     wanted = position + rotation @ [0, 0, 0.3]
     np.testing.assert_allclose(scenario.obstacle_rows(50)[:, 0, 9:12], wanted, rtol=0, atol=1e-12)
+
+
+def test_meshes_are_opened_where_touching_matters(tmp_path):
+    """They stay closed elsewhere; the file that is written says that they are open."""
+    trimesh.creation.capsule(0.3, 0.05).export(tmp_path / "rod.stl")
+    shape = '<collision><geometry><mesh filename="rod.stl"/></geometry></collision>'
+    limit = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+    joint = f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{limit}</joint>'
+    (tmp_path / "arm.urdf").write_text(f'<robot name="r"><link name="a"/><link name="b">{shape}</link>{joint}</robot>')
+    arm = ikgym.arms.from_urdf(tmp_path / "arm.urdf")
+    trajectory = ikgym.trajectories.Sinusoid([0.1], [1.0])
+    free = Scenario("s", arm, ikgym.tasks.get("position"), trajectory, steps=10)
+    assert (len(free.arm.bodies), len(free.arm.bodies.unseen)) == (0, 1)
+    clear = free.replace(collisions=True)
+    assert (clear.arm.bodies.names, clear.arm.bodies.unseen, clear.model is clear.arm) == (("b",), (), True)
+    clear.save(tmp_path / "s.toml")
+    assert "meshes = true" in (tmp_path / "s.toml").read_text()
+    read = ikgym.scenarios.load(tmp_path / "s.toml")
+    assert read.arm.bodies.starts.tobytes() == clear.arm.bodies.starts.tobytes()
+    (tmp_path / "rod.stl").unlink()
+    with pytest.raises(InvalidInputError, match=r"got none on 'b'\. 'b': its mesh 'rod.stl' was not found"):
+        free.replace(collisions=True)
+    changed = arm.replace(name="other")
+    with pytest.raises(InvalidInputError, match="got none on 'b'"):
+        Scenario("s", changed, ikgym.tasks.get("position"), trajectory, steps=10, collisions=True)
+
+
+def test_too_many_obstacles_are_counted_first(tmp_path):
+    ikgym.scenarios.get("panda-circle").save(tmp_path / "many.toml")
+    box = '[[obstacles]]\nkind = "no kind, which is not even read"\n'
+    text = (tmp_path / "many.toml").read_text().replace("obstacles = []\n", "")
+    (tmp_path / "many.toml").write_text(text + 1001 * box)
+    with pytest.raises(InvalidInputError, match="obstacles: expected at most 1000 tables, got 1001"):
+        ikgym.scenarios.load(tmp_path / "many.toml")
+
+
+@pytest.mark.parametrize("wrong", [5, "box", [5], None])
+def test_what_is_no_obstacle_is_refused(wrong):
+    with pytest.raises(InvalidInputError, match="obstacles: expected a list of obstacles, got"):
+        ikgym.arms.get("panda").clearance(np.zeros(7), wrong)

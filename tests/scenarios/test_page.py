@@ -46,7 +46,8 @@ def test_the_table_of_keys_is_complete():
 
 def test_the_arm_from_a_urdf_is_read(tmp_path):
     arm = tomllib.loads(ON_URDF)["arm"]
-    (tmp_path / "robots").mkdir()
+    for folder in ("robots", arm["packages"][0]):
+        (tmp_path / folder).mkdir(exist_ok=True)
     xml = robot(joint("j1", "base_link", "b"), joint("j2", "b", "flange"), links=("base_link", "b", "flange"))
     (tmp_path / arm["urdf"]).write_text(xml)
     head, trajectory = WHOLE.split("[arm]")[0], "[trajectory]\nkind = 'sinusoid'\namplitude = [0.1, 0.1]\n"

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.cli import shell
-from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions
+from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions, describe_bodies
 from baselines.cli.parsing import Rule
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
+from ikgym.arms.urdf import open_meshes
 from ikgym.scenarios import toml
 
 #: Most tips in a table; names alone of the others.
@@ -103,10 +104,12 @@ def _table(name: str, arm: Arm) -> str:
 
 
 def _bodies(arm: Arm) -> list[str]:
-    """The bodies of an arm, a line for each link that has some; nothing if there are none."""
+    """The bodies of an arm, with the meshes of its file, a line for each link; nothing if there are none."""
+    arm = open_meshes(arm)
     bodies, links = arm.bodies, ("the base", *arm.joint_names)
+    told = textwrap.fill(f"Bodies: {describe_bodies(arm)}", shell.width(), break_on_hyphens=False)
     if not len(bodies):
-        return []
+        return [told] if bodies.unseen else []
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     kinds = [f"capsule of {length:.3g} m" if length else "sphere" for length in lengths]
     texts = [
@@ -117,14 +120,15 @@ def _bodies(arm: Arm) -> list[str]:
         for link in sorted(set(bodies.links))
     ]
     table = shell.aligned([("moved by", f"bodies; {len(bodies.pairs)} pairs of them can meet"), *rows], shell.width())
-    return [table]
+    return [table, told]
 
 
 def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> str:
     """The arm as a scenario file has it."""
     stated = bool(np.isfinite(arm.acceleration_limit).any())
     limit = arm.acceleration_limit if stated else None
-    table = {"urdf": name, "base": given.base, "tip": tip, "tool": given.tool, "acceleration_limit": limit}
+    table: dict[str, object] = {"urdf": name, "base": given.base, "tip": tip, "tool": given.tool}
+    table |= {"packages": given.packages or None, "bodyless": given.bodyless or None, "acceleration_limit": limit}
     head = "In a scenario file:" if stated else "In a scenario file (add acceleration_limit, which no URDF states):"
     return f"{head}\n\n{toml.document({'arm': table}).strip()}"
 

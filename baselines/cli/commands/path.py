@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 import textwrap
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.own_path import RULES, OwnPath, scenario_of
+from baselines.cli.own_path import RULES, OwnPath, describe_bodies, scenario_of
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.motion import OTHERS, PREFERRED
 from baselines.paths.retiming import refusal, retimed
@@ -19,10 +19,11 @@ from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
 from ikgym import tasks
 from ikgym.arms import Arm
+from ikgym.arms.urdf import open_meshes
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
-from ikgym.validation import BoolArray, FloatArray, number, whole_number
+from ikgym.validation import BoolArray, FloatArray, known_names, number, whole_number
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
@@ -89,15 +90,25 @@ def _folded(line: str) -> str:
 
 def _scenario(options: Options) -> Scenario:
     """The scenario that the options mean, with its obstacles."""
-    scenario, changes = scenario_of(options), {}
+    scenario, changes = scenario_of(options), dict[str, Any]()
     if options.obstacles is not None:
-        table = read_user_toml(options.obstacles)
-        with files.located("", options.obstacles):
-            given = {"obstacles": table.get("obstacles", [])}
-            changes = files.arguments(Scenario, given, options.obstacles.parent, like=True)
-    if options.bodies is not None or options.file.endswith(".csv"):
-        changes["collisions"] = len(scenario.arm.bodies) > 0 if options.bodies is None else options.bodies == "on"
+        changes = _obstacles(options.obstacles)
+    if options.bodies is not None:
+        changes["collisions"] = options.bodies == "on"
+    elif options.file.endswith(".csv") and not changes.get("obstacles"):
+        changes["arm"] = arm = open_meshes(scenario.arm)
+        changes["collisions"] = len(arm.bodies) > 0 and not arm.bodies.unseen
     return scenario.replace(**changes) if changes else scenario
+
+
+def _obstacles(file: pathlib.Path) -> dict[str, Any]:
+    """The obstacles of a file, as a field of a scenario."""
+    table = read_user_toml(file)
+    with files.located("", file):
+        known_names("key", table, [field.name for field in dataclasses.fields(Scenario)])
+        if "obstacles" not in table:
+            raise InvalidInputError("obstacles: expected tables [[obstacles]], got no such key.")
+        return files.arguments(Scenario, {"obstacles": table["obstacles"]}, file.parent, like=True)
 
 
 def _head(found: Survey) -> list[str]:
@@ -118,6 +129,9 @@ def _tool(scenario: Scenario) -> list[str]:
     lines = [begins, f"  fastest {linear:.3g} m/s{asked}{turning}"]
     if _unstated(scenario.arm).any():
         lines.append("  acceleration limits are not stated (see --acceleration): velocities alone are checked")
+    if len(scenario.arm.bodies) or scenario.arm.bodies.unseen:
+        count = "bodies" if scenario.collides else "bodies, which do not count here"
+        lines.append(f"  {count}: {describe_bodies(scenario.arm)}")
     if scenario.cut_off:
         lines.append(f"  the episode ends {scenario.cut_off:.3g} s before the path: give it more steps, or none")
     return lines

@@ -8,6 +8,7 @@ import textwrap
 import numpy as np
 
 from baselines.cli import shell
+from baselines.cli.own_path import describe_bodies
 from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.scenarios import Scenario, durations
@@ -51,10 +52,10 @@ def _bodies(scenario: Scenario) -> dict[str, object]:
     for one in scenario.obstacles:
         kind = re.sub("(?<=[a-z])(?=[A-Z])", " ", type(one).__name__).lower()
         kinds.setdefault(kind, []).append(f"{one.name} (moves)" if one.motion is not None else one.name)
-    if not len(bodies) and not kinds:
+    if not len(bodies) and not kinds and not bodies.unseen:
         return {}
     count = "an arm that touches something is stopped" if scenario.collides else "do not count"
-    own = {"bodies": f"{len(bodies)} on the arm, {len(bodies.pairs)} pairs of which can meet"} if len(bodies) else {}
+    own = {"bodies": describe_bodies(scenario.arm)} if len(bodies) or bodies.unseen else {}
     near = {} if scenario.proximity is None else {"proximity": scenario.proximity}
     return {**own, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count, **near}
 

@@ -3,75 +3,134 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
-import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
 from ikgym.arms.bodies import Bodies
+from ikgym.arms.source import LinkShapes
 from ikgym.arms.urdf import xml
 from ikgym.arms.urdf.chain import read_origin
 from ikgym.arms.urdf.covering import Capsule
 from ikgym.arms.urdf.geometry import Solid, read_solid
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.bodies import OBSTACLE
+from ikgym.kernels.bodies.clearance import near_rows
 from ikgym.validation import FloatArray
 
 logger = logging.getLogger("ikgym")
 
 # Whole humanoids have about a hundred.
 MAX_BODIES = 256
-# Postures in which a pair has to touch to be left out.
-POSTURES = 100
+# Postures in which a pair has to touch to be left out, and pairs that are looked at together.
+POSTURES, TOGETHER = 100, 64
 
 
-def with_bodies(arm: Arm, tree: Tree, base: str, folder: Path | None) -> Arm:
-    """The arm with capsules around the collision geometry of all links below the base.
+def with_bodies(
+    arm: Arm, tree: Tree, base: str, tip: str, folders: Sequence[Path] | None, bodyless: Sequence[str]
+) -> tuple[Arm, tuple[LinkShapes, ...]]:
+    """The arm with capsules around the collision geometry of all links below the base, and what they were made from.
 
     Geometry of a link off the chain is fixed, at the zero position of its joints, to the link of the chain before it.
-    Pairs that touch in each of 100 random postures are ignored, and the log names them. Without a folder meshes stay
-    closed.
+    Pairs that touch in each of 100 random postures are ignored, and the log names them. Links of the chain, and links
+    fixed to them, are :attr:`Bodies.unseen` where they have a shape but no body, or where nothing that moves with them
+    has one.
+
+    Args:
+        arm: The arm, without bodies.
+        tree: The links of the file.
+        base: The link at which the arm begins.
+        tip: That at which it ends.
+        folders: That of the file, then those of packages; None where meshes stay closed.
+        bodyless: Links that have no body.
     """
     found: list[tuple[str, int, Capsule]] = []
-    solids: list[Solid] = []
-    closed = 0
+    shapes: list[LinkShapes] = []
+    unseen: list[str] = []
+    looked = {0, *(_place(arm, tree.path(base, link)).number for link in bodyless)}
     for link in tree.below(base):
-        read = [(each, read_solid(f"link {link!r}", each, folder)) for each in tree.collisions(link)]
-        closed += sum(solid is None for _, solid in read)
-        if opened := [(each, solid) for each, solid in read if solid is not None]:
-            solids += [solid for _, solid in opened]
-            if sum(len(solid.capsules) for solid in solids) > MAX_BODIES:
-                raise InvalidInputError(f"expected at most {MAX_BODIES} bodies from collision shapes, got more.")
-            number, capsules = _on_link(arm, tree.path(base, link), link, opened)
-            found += _named(link, number, capsules)
-    _report(arm.name, solids, closed)
-    if not found:
-        return arm
-    names, links, kept = zip(*found, strict=True)
-    starts, ends, radii = map(np.array, zip(*kept, strict=True))
-    arm = arm.replace(bodies=Bodies(names, links, starts, ends, radii))
-    return arm.replace(bodies=arm.bodies.replace(ignored=_always_touching(arm)))
+        if link in bodyless:
+            continue
+        place = _place(arm, tree.path(base, link))
+        read = [(each, read_solid(f"link {link!r}", each, folders)) for each in tree.collisions(link)]
+        solids = [(each, solid) for each, solid in read if isinstance(solid, Solid)]
+        reasons = [solid for _, solid in read if isinstance(solid, str)]
+        if not read and tree.visible(link):
+            reasons = ["it has a visual shape, but no collision shape"]
+        if reasons and place.rigid:
+            unseen.append(f"{link!r}: {reasons[0]}")
+        elif reasons and folders is not None:
+            logger.warning("%s: link %r, off the chain, has no body: %s.", arm.name, link, reasons[0])
+        if solids or reasons:
+            looked.add(place.number)
+        if solids:
+            capsules = list(_outermost(_placed(arm, place, link, solids)))
+            found += _named(link, place.number, capsules)
+            sources = dict.fromkeys(solid.source for _, solid in solids)
+            volumes = sum(solid.volume for _, solid in solids), sum(capsule.volume for capsule in capsules)
+            shapes.append(LinkShapes(link, " and ".join(sources), *volumes))
+        if len(found) > MAX_BODIES:
+            raise InvalidInputError(f"expected at most {MAX_BODIES} bodies from collision shapes, got more.")
+    for link in tree.between(base, tip):
+        number = _place(arm, tree.path(base, link)).number
+        if number not in looked:
+            looked.add(number)
+            unseen.append(f"{link!r}: it has no shape")
+    return _with(arm, found, unseen), tuple(shapes)
 
 
-def _on_link(arm: Arm, path: list[Element], link: str, read: list[tuple[Element, Solid]]) -> tuple[int, list[Capsule]]:
-    """The number of the arm's link to which a link is fixed, and its capsules there, without those inside others."""
+def _with(arm: Arm, found: Sequence[tuple[str, int, Capsule]], unseen: Sequence[str]) -> Arm:
+    """The arm with named capsules on its links, and with links that were not looked at."""
+    if found:
+        names, links, kept = zip(*found, strict=True)
+        starts, ends, radii = map(np.array, zip(*kept, strict=True))
+        arm = arm.replace(bodies=Bodies(names, links, starts, ends, radii))
+        arm = arm.replace(bodies=arm.bodies.replace(ignored=_always_touching(arm)))
+    return arm.replace(bodies=arm.bodies.replace(unseen=tuple(unseen))) if unseen else arm
+
+
+class _Place(NamedTuple):
+    """Where a link is when all joints are at 0.
+
+    Attributes:
+        number: Of the link of the arm that it is fixed to.
+        rigid: Whether it is fixed to that link: no joint off the chain is between them.
+        placement: In the frame of the base, with joints of the arm at 0.
+    """
+
+    number: int
+    rigid: bool
+    placement: Any
+
+
+def _place(arm: Arm, path: Sequence[Element]) -> _Place:
     import pinocchio
 
-    number = 0
-    placement = pinocchio.SE3.Identity()
+    number, rigid, placement = 0, True, pinocchio.SE3.Identity()
     for joint in path:
         placement = placement * pinocchio.SE3(*_origin(xml.label(joint), joint))
         if number < arm.joints and joint.get("name") == arm.joint_names[number]:
             number += 1
+        else:
+            rigid &= joint.get("type") == "fixed"
+    return _Place(number, rigid, placement)
+
+
+def _placed(arm: Arm, place: _Place, link: str, solids: Sequence[tuple[Element, Solid]]) -> list[Capsule]:
+    """The capsules of a link in the frame of the arm's link."""
+    import pinocchio
+
     capsules: list[Capsule] = []
-    for collision, solid in read:
-        there = placement * pinocchio.SE3(*_origin(f"link {link!r}", collision))
-        shift = there.translation - arm.offsets[:number].sum(axis=0)
+    for collision, solid in solids:
+        there = place.placement * pinocchio.SE3(*_origin(f"link {link!r}", collision))
+        shift = there.translation - arm.offsets[: place.number].sum(axis=0)
         capsules += [Capsule(there.rotation @ a + shift, there.rotation @ b + shift, r) for a, b, r in solid.capsules]
-    return number, list(_outermost(capsules))
+    return capsules
 
 
 def _origin(where: str, element: Element) -> tuple[FloatArray, FloatArray]:
@@ -97,27 +156,20 @@ def _named(link: str, number: int, capsules: list[Capsule]) -> Iterator[tuple[st
 
 
 def _always_touching(arm: Arm) -> list[tuple[str, str]]:
-    """Of the pairs that touch in the first posture those that touch in all of them."""
-    postures = _postures(arm)
-    always: list[tuple[str, str]] = []
-    others = arm
-    while True:
-        distance, pair = others.clearance(postures[0])
-        if distance >= 0.0:
-            break
-        first, second = (arm.bodies.names[i] for i in pair)
-        if (_pair_alone(arm, pair).clearance(postures)[0] < 0.0).all():
-            always.append((first, second))
-        others = others.replace(bodies=others.bodies.replace(ignored=(*others.bodies.ignored, (first, second))))
+    """The pairs that touch in all of some random postures."""
+    postures, bodies, always = _postures(arm), arm.bodies, list[tuple[str, str]]()
+    obstacles = np.empty((0, OBSTACLE)), np.empty((0, len(bodies)), dtype=np.bool_)
+    counts, distances = np.empty(POSTURES, dtype=np.int64), np.empty((POSTURES, TOGETHER))
+    pairs, gradients = np.empty((POSTURES, TOGETHER, 2), dtype=np.int64), np.empty((POSTURES, TOGETHER, arm.joints))
+    for begin in range(0, len(bodies.pairs), TOGETHER):
+        shapes = bodies.shapes._replace(pairs=bodies.pairs[begin : begin + TOGETHER].copy())
+        near_rows(arm.chain, shapes, *obstacles, postures, 0.0, counts, distances, pairs, gradients)
+        touching = np.concatenate([pairs[i, : counts[i]] for i in range(POSTURES)])
+        found, times = np.unique(touching, axis=0, return_counts=True)
+        always += [(bodies.names[i], bodies.names[j]) for i, j in found[times == POSTURES].tolist()]
     if always:
         logger.info("%s: ignored, since they always touch: %s", arm.name, ", ".join(map(" and ".join, always)))
     return always
-
-
-def _pair_alone(arm: Arm, pair: npt.NDArray[np.int64]) -> Arm:
-    bodies = arm.bodies
-    names, links = [bodies.names[i] for i in pair], [bodies.links[i] for i in pair]
-    return arm.replace(bodies=Bodies(names, links, bodies.starts[pair], bodies.ends[pair], bodies.radii[pair]))
 
 
 def _postures(arm: Arm) -> FloatArray:
@@ -125,12 +177,3 @@ def _postures(arm: Arm) -> FloatArray:
     most = np.where(arm.chain.prismatic, 1.0, np.pi)
     lower, upper = np.where(np.isfinite(arm.lower), arm.lower, -most), np.where(np.isfinite(arm.upper), arm.upper, most)
     return np.random.default_rng(0).uniform(lower, upper, (POSTURES, arm.joints))
-
-
-def _report(name: str, solids: list[Solid], closed: int) -> None:
-    if solids:
-        before = 1e3 * sum(solid.volume for solid in solids)
-        after = 1e3 * sum(capsule.volume for solid in solids for capsule in solid.capsules)
-        logger.info("%s: %d collision shapes of %.3g l, within capsules of %.3g l", name, len(solids), before, after)
-    if closed:
-        logger.info("%s: %d meshes were not opened and are no bodies; from_urdf(…, meshes=True) opens", name, closed)

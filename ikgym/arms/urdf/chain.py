@@ -103,8 +103,8 @@ def of_gripper(joint: str) -> bool:
     return _FINGER.search(joint) is not None
 
 
-def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list[UrdfJoint]]:
-    """The link at the beginning of a chain, and its joints.
+def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, str, list[UrdfJoint]]:
+    """The links at both ends of a chain, and its joints.
 
     The links of the whole file must be a tree. Numbers are checked between the two links only: no other joint
     has a say in where the tip is. Without a base it begins at the root, without a tip it ends at :func:`only_tip`.
@@ -116,7 +116,7 @@ def read_chain(tree: Tree, base: str | None, tip: str | None) -> tuple[str, list
     joints = list(map(read_joint, path))
     if not any(joint.kind in MOVING for joint in joints):
         raise InvalidInputError(f"expected a joint that moves between links {base!r} and {tip!r}, got none.")
-    return base, joints
+    return base, tip, joints
 
 
 def only_tip(tree: Tree, base: str) -> str:

@@ -18,7 +18,17 @@ from ikgym.arms.urdf.chain import MOVING, Tip, UrdfJoint, likely_tips, of_grippe
 from ikgym.arms.urdf.tree import Tree
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, about, flag, frozen_array, known_name, rotation_matrix
+from ikgym.validation import (
+    FloatArray,
+    about,
+    different_texts,
+    flag,
+    frozen_array,
+    known_name,
+    known_names,
+    rotation_matrix,
+    shortened,
+)
 
 logger = logging.getLogger("ikgym")
 
@@ -44,6 +54,8 @@ def from_urdf(
     tool: npt.ArrayLike | None = None,
     tool_rotation: npt.ArrayLike | None = None,
     meshes: bool = False,
+    packages: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
+    bodyless: Sequence[str] = (),
 ) -> Arm:
     """An arm from the chain between two links of a URDF file.
 
@@ -55,8 +67,9 @@ def from_urdf(
     Collision geometry of the base and of all links below it becomes :attr:`Arm.bodies`, called after the links; links
     off the chain are fixed at the zero position of its joints. Spheres and capsules are exact. A cylinder becomes
     the capsule of its axis and radius, 4/3 π r³ larger; a box up to four capsules along its longest edge, or the sphere
-    around it where that is smaller; a mesh the smallest capsule around its corners that a search finds. The log states
-    the volumes, and the pairs that always touch, which are ignored.
+    around it where that is smaller; a mesh the smallest capsule around its corners that a search finds. Pairs that
+    touch in each of 100 random postures are ignored, and the log names them. A link of the chain, or one fixed to it,
+    that has a shape but no body is :attr:`Bodies.unseen`, and so is one that moves with nothing that has a body.
 
     Axes are scaled to unit length; the log names those that are off by more than 1e-2, velocity limits above 50 rad/s,
     which may be in degrees, and continuous joints without one. Refused are limits of more than two turns, up to 1e4
@@ -72,16 +85,18 @@ def from_urdf(
         tool: Tool point in the frame of the tip, in [m]; the frame's origin if it is left out. Shape (3,).
         tool_rotation: Orientation of the tool in the frame of the tip, a rotation matrix; that of the frame if it
             is left out. Shape (3, 3).
-        meshes: Whether collision meshes are opened: STL, OBJ, PLY and DAE, by a path from the file or by the name of a
-            package, a folder of that name above the file. Closed ones are no bodies.
+        meshes: Whether collision meshes are opened at once: STL, OBJ, PLY and DAE, by a path from the file or by the
+            name of a package. A scenario with obstacles or collisions opens them in any case.
+        packages: Folders in which packages of meshes are searched, or that are such packages, before the folders above
+            the file.
+        bodyless: Links without a body, since they may touch.
 
     Returns:
         The arm. Lengths in [m], angles in [rad], as in the file. Its :attr:`Arm.urdf` names the file.
 
     Raises:
         InvalidInputError: The file cannot be read, is no URDF, or has no such chain from base to tip; collision
-            geometry has a wrong number, or a mesh cannot be read; or the tool offset has a wrong shape or is no
-            rotation.
+            geometry has a wrong number; or the tool offset has a wrong shape or is no rotation.
         UnknownNameError: There is no link of that name; the message has the nearest one.
         MissingDependencyError: Pinocchio is not installed, or for meshes trimesh or SciPy.
     """
@@ -89,7 +104,7 @@ def from_urdf(
     content = read_user_file(path, MAX_BYTES)
     with about(path):
         tree = Tree(content)
-        begin, joints = read_chain(tree, base, tip)
+        begin, end, joints = read_chain(tree, base, tip)
         moving = [joint for joint in joints if joint.kind in MOVING]
         tool = None if tool is None else frozen_array("tool", tool, (3,))
         tool_rotation = None if tool_rotation is None else rotation_matrix("tool_rotation", tool_rotation)
@@ -107,14 +122,35 @@ def from_urdf(
             joint_names=[joint.name for joint in moving],
         )
         file = Path(path).resolve()
-        arm = with_bodies(arm, tree, begin, file.parent if meshes else None)
-        object.__setattr__(arm, "urdf", UrdfReference(file, base, tip, tool, tool_rotation, meshes))
+        searched, bodyless = _folders(packages), tuple(different_texts("bodyless", bodyless))
+        known_names("link", bodyless, tree.below(begin))
+        folders = (file.parent, *searched) if meshes else None
+        arm, shapes = with_bodies(arm, tree, begin, end, folders, bodyless)
+        reference = UrdfReference(file, base, tip, tool, tool_rotation, meshes, searched, bodyless, shapes)
+        object.__setattr__(arm, "urdf", reference)
         remarks = [remark for joint in joints for remark in joint.remarks]
         if of_gripper(moving[-1].name):
             remarks.append(f"the last joint of the arm, {moving[-1].name!r}, seems to belong to a gripper")
         for remark in remarks:
             logger.warning("%s: %s.", file.name, remark)
         return arm
+
+
+def open_meshes(arm: Arm) -> Arm:
+    """The arm with bodies from the meshes of its URDF file; the arm itself where no link would gain any.
+
+    Raises:
+        InvalidInputError: The file cannot be read any more, or a mesh is of no known kind.
+        MissingDependencyError: trimesh or SciPy are not installed.
+    """
+    source = arm.urdf
+    if source is None or source.meshes or not arm.bodies.unseen:
+        return arm
+    options = {name: getattr(source, name) for name in ("base", "tip", "tool", "tool_rotation", "packages", "bodyless")}
+    read = from_urdf(source.file, meshes=True, **options)
+    opened = arm.replace(bodies=read.bodies)
+    object.__setattr__(opened, "urdf", read.urdf)
+    return opened
 
 
 def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ...]:
@@ -137,6 +173,18 @@ def tips(path: str | PathLike[str], *, base: str | None = None) -> tuple[Tip, ..
         if base is not None:
             known_name("link", base, tree.links)
         return tuple(likely_tips(tree, tree.root if base is None else base))
+
+
+def _folders(packages: object) -> tuple[Path, ...]:
+    """Folders of packages, as absolute paths."""
+    given = [packages] if isinstance(packages, (str, PathLike)) else packages
+    if not isinstance(given, (tuple, list)) or not all(isinstance(one, (str, PathLike)) for one in given):
+        raise InvalidInputError(f"packages: expected a folder or a list of folders, got {shortened(packages)}.")
+    folders = tuple(Path(one).resolve() for one in given)
+    for folder in folders:
+        if not folder.is_dir():
+            raise InvalidInputError(f"packages: expected a folder, found none at {str(folder)!r}.")
+    return folders
 
 
 def _with_tool(tip: _Home, tool: FloatArray | None, tool_rotation: FloatArray | None) -> _Home:

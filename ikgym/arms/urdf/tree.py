@@ -70,6 +70,14 @@ class Tree:
         """The collision geometry of a link."""
         return self._elements[link].findall("collision")
 
+    def visible(self, link: str) -> bool:
+        """Whether a link has a visual shape."""
+        return self._elements[link].find("visual") is not None
+
+    def between(self, base: str, tip: str) -> list[str]:
+        """The links from base to tip, without the base."""
+        return [xml.required("", joint, "child").get("link", "") for joint in self.path(base, tip)]
+
     def path(self, base: str, tip: str) -> list[Element]:
         """The joints from base to tip."""
         joints: list[Element] = []

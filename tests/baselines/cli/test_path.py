@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import baselines
 import ikgym
@@ -188,3 +189,63 @@ def test_tables_fit_the_terminal(width, capsys, monkeypatch):
     assert main(command("ur10", "--acceleration", "20")) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(len(line) for line in lines if not line.startswith("start = ")) <= width
+
+
+ROOM = '[[obstacles]]\nkind = "box"\nname = "block"\nposition = [0.55, 0, 0.25]\nsize = [0.2, 0.2, 0.2]\n'
+JOINTS = "".join(
+    f'<link name="l{i}">{{}}</link><joint name="j{i}" type="revolute"><parent link="l{i - 1}"/><child link="l{i}"/>'
+    f'<origin xyz="0 0 {z}"/><axis xyz="{axis}"/><limit lower="-3" upper="3" velocity="2" effort="1"/></joint>'
+    for i, (z, axis) in enumerate([(0.3, "0 0 1"), (0.0, "0 1 0"), (0.4, "0 1 0"), (0.3, "0 0 1")], 1)
+)
+BALL = '<collision><geometry><{} radius="0.04"/></geometry></collision>'
+MESH = '<collision><geometry><mesh filename="package://parts/rod.stl"/></geometry></collision>'
+
+
+def arm_file(*shapes):
+    """A URDF file of an arm whose four links have these shapes."""
+    Path("own.urdf").write_text(f'<robot name="own"><link name="l0"/>{JOINTS.format(*shapes)}</robot>')
+
+
+def test_no_verdict_about_links_that_were_not_looked_at(capsys, tmp_path):
+    """A file without shapes, or with meshes, was driven through the obstacle."""
+    Path("room.toml").write_text(ROOM)
+    words = ["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02", "--obstacles", "room.toml"]
+    arm_file("", "", "", "")
+    assert main(words) == 2
+    assert "got none on 'l1', 'l2', 'l3', 'l4'. 'l1': it has no shape." in capsys.readouterr().err
+    arm_file(BALL.format("sphere"), MESH, MESH, MESH)
+    assert main(words) == 2
+    assert "got none on 'l2', 'l3', 'l4'. 'l2': its mesh 'package://parts/rod.stl' was not" in capsys.readouterr().err
+    folder = tmp_path / "elsewhere" / "parts"
+    folder.mkdir(parents=True)
+    trimesh.creation.capsule(0.3, 0.05).export(folder / "rod.stl")
+    assert main([*words, "--packages", "elsewhere"]) == 2
+    assert "'l4' and 'block' overlap" in capsys.readouterr().err
+    assert main(["arms", "own.urdf", "--packages", "elsewhere"]) == 0
+    said = re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert re.search(r"around meshes, in times the volume of the hull: l2 1\S*, l3 1\S*, l4 1", said)
+    arm_file("", "", "", "")
+    assert main([*words, "--bodyless", "l1", "l2", "l3", "l4"]) == 2
+    assert "expected an arm with bodies" in capsys.readouterr().err
+
+
+def test_an_arm_that_cannot_be_looked_at_is_said_not_to_be(capsys):
+    arm_file(BALL.format("sphere"), "", "", "")
+    assert main(["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
+    said = re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert "bodies, which do not count here: 1 on the arm" in said
+    assert "NOT LOOKED AT: 'l2': it has no shape; 'l3'" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "room.toml: obstacles: expected tables [[obstacles]], got no such key."),
+        (ROOM.replace("obstacles", "obstacle"), "Did you mean 'obstacles'?"),
+        ("obstacles = []\n", None),
+    ],
+)
+def test_a_file_without_obstacles_is_no_free_space(text, message, capsys):
+    Path("room.toml").write_text(text)
+    assert main([*WELD, "--speed", "0.1", "--obstacles", "room.toml"]) == (0 if message is None else 2)
+    assert message is None or message in capsys.readouterr().err
