@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from tqdm import tqdm
 
 from baselines.paths.starts import solutions
 from ikgym.exceptions import InvalidInputError
@@ -98,8 +99,11 @@ class Routes:
         q = solutions(self.scenario) if start is None else start[None]
         layers = [Layer(q, np.zeros(len(q)), np.zeros(len(q), dtype=np.int64))]
         layers[0] = layers[0].of(self._clear(0, q))
-        while len(layers) < len(self.times) and len(layers[-1].q):
-            layers.append(self._next(len(layers), layers[-1], rng))
+        # A search of seconds needs no bar, one of minutes does; there is none where nobody watches.
+        with tqdm(total=len(self.times), desc="Planning", unit="knot", delay=3.0, disable=None, leave=False) as bar:
+            while len(layers) < len(self.times) and len(layers[-1].q):
+                layers.append(self._next(len(layers), layers[-1], rng))
+                bar.update()
         if not len(layers[-1].q):
             layers.pop()
         row, out = int(np.argmin(layers[-1].cost)) if layers else 0, []
