@@ -12,6 +12,7 @@ import numpy.typing as npt
 from baselines.status import Status
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.limits import applied
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -144,7 +145,7 @@ def parts_of(answer: Any, rows: int, n: int) -> tuple[Any, Any, Any]:
 _parts_of = kernel(parts_of)
 
 
-def entry(step: Any, numbers: type, memory: type) -> Any:
+def entry(step: Any, numbers: type, memory: type, remembers: bool) -> Any:
     """The compiled call behind `predict` of a solver, around the kernel of its step.
 
     It takes the named tuples of the kernel apart, which numba reads three times as fast as plain tuples, checks the
@@ -154,6 +155,7 @@ def entry(step: Any, numbers: type, memory: type) -> Any:
         step: The kernel, ``step(model, numbers, seen, memory, answer)``, see :class:`CompiledPolicy`.
         numbers: The named tuple of its parameters.
         memory: The named tuple of its memory.
+        remembers: Whether the last commands stand behind the memory, and are the ``qdot`` that the kernel sees.
 
     Returns:
         ``call(block, numbers, checking, seen, memory, action, answer)`` with plain tuples and flat arrays, whatever the
@@ -162,9 +164,15 @@ def entry(step: Any, numbers: type, memory: type) -> Any:
         of no elements nothing is cut.
     """
     python = getattr(step, "py_func", step)
-    scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory}
-    call = types.FunctionType(_call.__code__, scope, f"{python.__name__}_call")
-    call.__module__, call.__qualname__ = python.__module__, f"{python.__name__}_{numbers.__name__}_{memory.__name__}"
+    name = f"{python.__name__}_{numbers.__name__}_{memory.__name__}"
+    call = _copy(_call, python.__module__, name, step=step, Numbers=numbers, Memory=memory)
+    return _copy(_remembering_call, python.__module__, f"{name}_remembering", call=call) if remembers else call
+
+
+def _copy(function: Any, module: str, name: str, **scope: Any) -> Any:
+    """A compiled copy of a function, with other globals."""
+    call = types.FunctionType(function.__code__, {**globals(), **scope}, f"{name}_call")
+    call.__module__, call.__qualname__ = module, name
     return kernel(call)
 
 
@@ -182,6 +190,48 @@ def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, actio
     if action.shape[0] == 0:
         return False
     return cut_rows(out.qdot, model.unit, action.reshape(rows, n), out.status)
+
+
+def _remembering_call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, action: Any, answer: Any) -> Any:
+    """See :func:`entry`; behind the block of the model are the limits of the arm, as :func:`sent_rows` takes them."""
+    q, qdot, pose, nominal, remaining = seen
+    if checking and not all_finite(q, qdot, pose, nominal, remaining):
+        return REFUSED
+    n = int(block[0])
+    size, last = 15 + 11 * n, memory[-1].reshape(-1)
+    for i in range(last.shape[0]):
+        if math.isnan(last[i]):
+            last[i] = qdot[i]
+    result = call(  # type: ignore[name-defined]  # noqa: F821
+        block[:size], numbers, False, (q, last, pose, nominal, remaining), memory[:-1], action, answer
+    )
+    if action.shape[0] > 0:
+        limits, unit = block[size:].reshape((block.shape[0] - size) // n, n), block[3 : 3 + n]
+        sent_rows(limits, block[2], unit, q.reshape(-1, n), action.reshape(-1, n), last.reshape(-1, n))
+    return result
+
+
+@kernel
+def sent_rows(limits, dt, unit, q, action, last):
+    """The joint velocities that an ideal arm within the limits makes of actions, row by row.
+
+    Args:
+        limits: See :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
+        dt: Δt in [s].
+        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
+        q: Joint coordinates in [rad] or [m]. Shape (B, n).
+        action: Shape (B, n).
+        last: Velocities of the step before in [rad/s] or [m/s]; becomes those of this one. Shape (B, n).
+    """
+    n = unit.shape[0]
+    command = np.empty(n)
+    for row in range(q.shape[0]):
+        for j in range(n):
+            command[j] = action[row, j] * unit[j]
+        if limits.shape[0] > 0:
+            applied(limits, q[row], command, last[row], dt, last[row])
+        else:
+            last[row] = command
 
 
 @kernel

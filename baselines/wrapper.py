@@ -47,13 +47,18 @@ class Wrapper(SolverPolicy, abc.ABC):
 
     def memory(self, rows: int) -> Memory:
         """The wrapper's own memory, then that of the inner policy."""
-        return *self.own_memory(rows), *(() if self.inner is None else self.inner.memory(rows))
+        return *self.own_memory(rows), *(() if self.inner is None else self.inner.initial_memory(rows))
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
         """See :meth:`SolverPolicy.restarted`; the inner policy keeps its memory."""
         own, inside = self.split(memory)
         fresh = () if self.inner is None else self.inner.restarted(inside, rows)
         return *self.own_restarted(own, rows), *fresh
+
+    def recall(self, memory: Memory, qdot: FloatArray) -> Memory:
+        """See :meth:`SolverPolicy.recall`; the inner policy's command."""
+        own, inside = self.split(memory)
+        return *own, *(() if self.inner is None else self.inner.recall(inside, qdot))
 
     def own_restarted(self, own: Any, rows: npt.NDArray[np.bool_]) -> Memory:
         """The wrapper's own memory, cleared where an episode begins."""

@@ -118,7 +118,9 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     | `commands` | (h, n) | the last h commands within the velocity limit, newest first; with `commands=h` | as `qdot` |
     | `obstacles` | (o, 16) | obstacles after the coming step; where they move or are drawn | [m], rotation parts 1 |
 
-    `q` and `pose` are the measurements of the scenario's plant; with an ideal plant they are exact.
+    `q` and `pose` are the measurements of the scenario's plant; with an ideal plant they are exact. `qdot` is that of
+    transition 3, or of 5 at a stop: late where commands are, without lag and noise. Policies that keep acceleration
+    limits use it in the first step of an episode alone, and then the last command, which they remember.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives only those steps.
     A row of `obstacles` has a rotation, row by row, a position, half of the edges and a radius, see
     :class:`ikgym.kernels.bodies.Surroundings`. The nominal goes on past the end of the episode. All bounds are finite

@@ -65,6 +65,7 @@ class LearnedPolicy(SolverPolicy):
     #: Limits that actions keep, see :func:`keep_rows`; None if the arm has none, or the agent ignores them.
     limits: FloatArray | None = dataclasses.field(init=False, repr=False)
 
+    keeps_acceleration: ClassVar[bool] = True
     grain: ClassVar[int] = 32
 
     def _take(self, file: AgentFile, *, any_arm: bool = False) -> None:

@@ -126,7 +126,9 @@ class Controller:
                 [m]. None where it is not measured: then it is the model's at q.
             reference: The pose wanted at the end of this period, and then as many as the policy looks ahead, see
                 :attr:`ahead`: task coordinates (p, m), or rotations (p, 3, 3) and positions (p, 3) in [m].
-            qdot: Measured joint velocities in [rad/s] or [m/s]; the last command if left out. Shape (n,).
+            qdot: Measured joint velocities in [rad/s] or [m/s]; the last command if left out. The acceleration limits
+                of the first command start from them, those of later ones from the command before, in the policy as
+                well. Policies without acceleration limits are shown them in each period. Shape (n,).
             q_age: Control periods since q was measured.
             pose_age: The same of the pose.
             obstacles: The obstacles as they will be at the end of this period, in the order of the scenario's, where
@@ -252,8 +254,8 @@ class Controller:
         if obstacles is not None:
             batch = batch._replace(obstacles=obstacles[None])
         try:
-            memory = self.policy.memory(1) if self._state is None else remembered(self._state)
-            action, self._state = self.policy.act(batch, memory)
+            memory = self.policy.initial_memory(1) if self._state is None else remembered(self._state)
+            action, self._state = self.policy.act(batch, self.policy.recall(memory, self._last[None].copy()))
         except Exception:
             logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)
             self._stopped = StopReason.POLICY

@@ -1,7 +1,8 @@
 """Input and output of `predict`: observations, checked and batched, and the state.
 
-The state is a flat tuple of arrays, (status, iterations, *memory), each with a leading axis of B. Only this module
-needs to know the layout: :func:`pack` makes a state, `SolverPolicy.report` and `SolverPolicy.memory_of` read it.
+The state is a flat tuple of arrays, (status, iterations, *memory), each with a leading axis of B; at the end of the
+memory is the last command, where the policy remembers it. :func:`pack` makes a state, `SolverPolicy.report` and
+`SolverPolicy.memory_of` read it.
 """
 
 from __future__ import annotations

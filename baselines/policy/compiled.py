@@ -16,7 +16,7 @@ from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, read_only
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
@@ -61,9 +61,10 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         call, block, numbers, _ = self._kernel
         answer, kept = np.empty(rows * (n + 2), np.int64), tuple([array.copy() for array in memory])
         parts: Parts = self._flat(batch)
+        last = (batch.qdot,) if self.remembers_command else ()  # :meth:`SolverPolicy.act` has put it there
         if self.sees_extras:
             parts, numbers = self._told(parts, numbers)
-        call(block, numbers, False, parts, kept, np.empty(0, np.float32), answer)  # nothing is cut here
+        call(block, numbers, False, parts, (*kept, *last), np.empty(0, np.float32), answer)  # nothing is cut here
         qdot, status, iterations = parts_of(answer, rows, n)
         return Solution(qdot, self._named(kept), status, iterations)
 
@@ -123,14 +124,15 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         n, m, among = self.problem.model.joints, self.problem.task.size, self.among_bodies
         numbers = self.numbers_among() if among else self.numbers()
         step = type(self).step_among if among else type(self).step
-        call, kept = _entry(step, type(numbers), type(self._example)), tuple(numbers)
+        call = _entry(step, type(numbers), type(self._example), self.remembers_command)
+        block, kept = _block(self.problem, self.remembers_command), tuple(numbers)
         if call not in compiled_classes:
             with self._first_call():
                 compiled_classes.add(call)
                 nothing = (*np.empty((3, 0)), np.empty((0, m)), np.empty(0))
-                memory, out = tuple(self.memory(0)), (np.empty(0, np.float32), np.empty(0, np.int64))
-                call(_block(self.problem), kept, False, nothing, memory, *out)
-        return call, _block(self.problem), kept, n
+                memory, out = tuple(self.initial_memory(0)), (np.empty(0, np.float32), np.empty(0, np.int64))
+                call(block, kept, False, nothing, memory, *out)
+        return call, block, kept, n
 
 
 #: One compiled call for each kernel and the types of its arguments.
@@ -138,7 +140,9 @@ _entry = functools.cache(entry)
 
 
 @functools.lru_cache(64)  # problems are frozen, and shared by many policies
-def _block(problem: Problem) -> FloatArray:
+def _block(problem: Problem, limited: bool) -> FloatArray:
+    """The model as one block, with the limits of an ideal arm behind it where commands are remembered."""
     model = problem.model
     limits = problem.velocity_limit, model.lower, model.upper, problem.largest_qdot
-    return model_block(model.chain, problem.task.kind, problem.dt, *limits)
+    block = model_block(model.chain, problem.task.kind, problem.dt, *limits)
+    return read_only(np.append(block, problem.limit_rows)) if limited else block

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms import Arm
+from ikgym.arms.limits import limit_rows
 from ikgym.cost import TrackingCost
 from ikgym.frozen import Frozen
 from ikgym.kernels.bodies import Surroundings
 from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
-from ikgym.validation import FloatArray, frozen_array
+from ikgym.validation import FloatArray, frozen_array, read_only
 
 #: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
 Memory = tuple[npt.NDArray[Any], ...]
@@ -50,6 +52,11 @@ class Problem(Frozen):
     def largest_qdot(self) -> FloatArray:
         """The largest joint velocities that actions and the limits of the model allow. Shape (n,)."""
         return np.minimum(self.velocity_limit, self.model.velocity_limit)
+
+    @functools.cached_property
+    def limit_rows(self) -> FloatArray:
+        """The limits of an ideal arm of this model, see :func:`ikgym.arms.limits.limit_rows`. Shape (4 or 0, n)."""
+        return read_only(limit_rows(self.model, self.largest_qdot, self.dt))
 
     def poses(self, q: FloatArray) -> FloatArray:
         """Task coordinates of the model at joint coordinates of shape (B, n). Shape (B, m)."""

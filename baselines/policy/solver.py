@@ -31,7 +31,7 @@ from baselines.policy.arguments import (
 from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.sharing import divided, undivided
-from baselines.policy_kernels import all_finite, cut_rows
+from baselines.policy_kernels import all_finite, cut_rows, sent_rows
 from ikgym.frozen import Frozen
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
@@ -64,6 +64,8 @@ class SolverPolicy(Frozen, abc.ABC):
     rival: ClassVar[bool] = False
     #: Whether it is shown the ages of measurements, past commands and obstacles, where an observation has them.
     sees_extras: ClassVar[bool] = True
+    #: Whether it keeps acceleration limits, if there are any, see :attr:`remembers_command`.
+    keeps_acceleration: ClassVar[bool] = False
     #: Whether `predict` accepts the observations of several arms at once.
     batched: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
@@ -126,6 +128,30 @@ class SolverPolicy(Frozen, abc.ABC):
         del rows
         return ()
 
+    @functools.cached_property
+    def remembers_command(self) -> bool:
+        """Whether :meth:`solve` is shown the last command in place of the observed joint velocity.
+
+        Acceleration limits bind a command to the one before; the observed velocity may be late or measured. The last
+        command is what an ideal arm makes of the last action, and NaN where an episode begins: there the observed
+        velocity counts.
+        """
+        return self.keeps_acceleration and bool(np.isfinite(self.problem.model.acceleration_limit).any())
+
+    def initial_memory(self, rows: int) -> Memory:
+        """The memory at the start of an episode as states have it: behind it the last command, if remembered."""
+        memory = self.memory(rows)
+        return (*memory, np.full((rows, self.problem.model.joints), np.nan)) if self.remembers_command else memory
+
+    def recall(self, memory: Memory, qdot: FloatArray) -> Memory:
+        """A memory with another last command: for wrappers and control loops, which know what was sent.
+
+        Args:
+            memory: As :meth:`initial_memory` or the last call gave it.
+            qdot: In [rad/s] or [m/s]. Shape (B, n).
+        """
+        return (*memory[:-1], qdot) if self.remembers_command else memory
+
     @abc.abstractmethod
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """Joint velocities for a batch of observations.
@@ -173,14 +199,23 @@ class SolverPolicy(Frozen, abc.ABC):
 
         Args:
             batch: The observations, with no more steps ahead than the policy asks for; C-contiguous.
-            memory: As :meth:`memory` or the last call gave it, without status and iterations.
+            memory: As :meth:`initial_memory` or the last call gave it, without status and iterations.
 
         Returns:
             Actions, of shape (B, n), and the state for the next call of `predict`.
         """
+        problem, last = self.problem, np.empty(0)
+        if self.remembers_command:
+            *most, last = memory
+            last = np.where(np.isnan(last), batch.qdot, last)
+            batch, memory = batch._replace(qdot=last.copy()), tuple(most)
         qdot, kept, status, iterations = self._solve(batch, memory)
         action, status = np.empty(qdot.shape, np.float32), status.copy()
-        if cut_rows(qdot, self.problem.velocity_limit, action, status):
+        lost = cut_rows(qdot, problem.velocity_limit, action, status)
+        if self.remembers_command:
+            sent_rows(problem.limit_rows, problem.dt, problem.velocity_limit, batch.q, action, last)
+            kept = (*kept, last)
+        if lost:
             kept = self._without_lost(kept, qdot)
         return action, pack(status, iterations, kept)
 
@@ -191,11 +226,12 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def memory_of(self, state: Memory) -> Memory:
         """The memory in a state that `predict` returned: the named tuple of :meth:`memory`, where it gives one."""
-        return self._named(remembered(state))
+        memory = remembered(state)
+        return self._named(memory[:-1] if self.remembers_command else memory)
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
         """A memory, cleared in the rows where an episode begins. Shape (B,)."""
-        return replace_rows(memory, self.memory(len(rows)), rows) if memory else memory
+        return replace_rows(memory, self.initial_memory(len(rows)), rows) if memory else memory
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """Diagnostics of the last solve by name, each of shape (B, …), from the state that `predict` returned."""
@@ -217,12 +253,12 @@ class SolverPolicy(Frozen, abc.ABC):
     def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
         """A memory, cleared where a joint velocity is no number; with the values of the start of an episode."""
         lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
-        return replace_rows(memory, self.memory(len(lost)), lost) if memory else memory
+        return replace_rows(memory, self.initial_memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
         starting = None if episode_start is None else truth_values(episode_start, rows)
         if state is None:
-            return self.memory(rows)
+            return self.initial_memory(rows)
         if state is self._last[0] and len(state[0]) == rows:
             memory = remembered(state)
         else:
@@ -239,7 +275,7 @@ class SolverPolicy(Frozen, abc.ABC):
     @functools.cached_property
     def _signature(self) -> Callable[[int], Signature]:
         """Specification of the memory of so many rows; cached, since `predict` often has as many again."""
-        return functools.lru_cache(16)(functools.partial(signature, self._example))
+        return functools.lru_cache(16)(functools.partial(signature, self.initial_memory(1)))
 
     @functools.cached_property
     def _example(self) -> Memory:

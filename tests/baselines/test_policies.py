@@ -153,7 +153,8 @@ def test_memory_has_names_and_what_is_returned_is_fresh(name):
         # The state is flat, and its memory has the names that `memory` gives it.
         assert type(state) is tuple
         assert type(policy.memory_of(state)) is type(policy.memory(1))
-        assert identical(tuple(policy.memory_of(state)), state[2:])
+        last = 1 if policy.remembers_command else 0
+        assert identical(tuple(policy.memory_of(state)), state[2 : len(state) - last])
     for k, array in enumerate(returned):
         assert not any(np.shares_memory(array, other) for other in returned[k + 1 :])
 
@@ -191,7 +192,7 @@ def test_any_policy_inside_smoothed(name):
     assert policy.options == alone.parameters
     own, inside = policy.split(policy.memory(3))
     assert own._fields == ("known", "q", "qdot", "smooth")
-    assert identical(tuple(inside), tuple(alone.memory(3)))
+    assert identical(tuple(inside), tuple(alone.initial_memory(3)))
     observation = next(observations(usual(name), policy.preview, 3))
     action, state = policy.predict(observation)
     assert [array.shape for array in state[2:]] == [array.shape for array in (*own, *inside)]

@@ -121,7 +121,8 @@ class Predicted(NamedWrapper):
         own, inside = self.split(memory)
         kept = PredictedMemory(*[array.copy() for array in own])
         off = self._observe(batch, kept)
-        step = self.ask(self._shown(batch, kept), inside)
+        shown = self._shown(batch, kept)
+        step = self.ask(shown, self.inner.recall(inside, shown.qdot))
         behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
         qdot = np.empty_like(batch.q)
         limits, servo = self._limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -69,6 +69,8 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
     rotation_weight: float = parameter(1.0, number, above=0.0)
     _pull: FloatArray = dataclasses.field(init=False, repr=False)
+
+    keeps_acceleration: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

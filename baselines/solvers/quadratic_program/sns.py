@@ -142,6 +142,7 @@ class SaturationInNullSpace(ResolvedRate):
     damping: float = parameter(3e-5, number, at_least=0.0)
 
     name: ClassVar[str] = "sns"
+    keeps_acceleration: ClassVar[bool] = True
     step = sns_step
 
     def numbers(self) -> SaturationNumbers:

@@ -11,6 +11,7 @@ trajectory within 500 steps, without 36.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -145,6 +146,11 @@ class RecedingHorizon(CompiledPolicy):
         """Whether plans are made by the interior point method: with limits of acceleration or among bodies."""
         return bool(np.isfinite(self.problem.model.acceleration_limit).any()) or self.among_bodies
 
+    @functools.cached_property
+    def remembers_command(self) -> bool:
+        """See :attr:`SolverPolicy.remembers_command`; plans under any limits move along with the arm, too."""
+        return self.interior_point or self.rate_weight > 0.0
+
     @property
     def preview(self) -> int:
         """Grid points 2 … HL lie ahead."""
@@ -154,7 +160,7 @@ class RecedingHorizon(CompiledPolicy):
         """An empty plan and restart candidate; see :class:`HorizonMemory`."""
         width = self.problem.task.error_size + 3 * self.problem.model.joints
         plans = np.zeros((rows, 2 if self.restart_steps else 1, len(self.offsets) * width))
-        return HorizonMemory(plans, np.zeros((rows, 4), dtype=np.int64))
+        return HorizonMemory(plans, np.zeros((rows, 4), dtype=np.int64), np.zeros((rows, self.problem.model.joints)))
 
     def _knots(self) -> npt.NDArray[np.int64]:
         """Steps from now to the knots. Shape (K,)."""

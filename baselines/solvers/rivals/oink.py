@@ -39,6 +39,7 @@ class Roboplan(TaskProgram):
     safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
 
     name: ClassVar[str] = "roboplan"
+    keeps_acceleration: ClassVar[bool] = True
     package: ClassVar[str] = "roboplan.optimal_ik"
     distribution: ClassVar[str] = "roboplan-oink"
     #: Its frame task has one cost for all axes of the orientation.

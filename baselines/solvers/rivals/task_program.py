@@ -116,6 +116,7 @@ class Pink(SolverProgram):
     safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
 
     name: ClassVar[str] = "pink"
+    keeps_acceleration: ClassVar[bool] = True
     package: ClassVar[str] = "pink"
     distribution: ClassVar[str] = "pin-pink"
 

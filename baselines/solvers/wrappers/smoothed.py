@@ -87,7 +87,8 @@ class Smoothed(NamedWrapper):
         known = own.known[:, None]
         calculated = np.where(known, own.q, batch.q)
         qdot = np.where(known, own.qdot, batch.qdot)
-        step = self.ask(batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated)), inside)
+        shown = batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated))
+        step = self.ask(shown, self.inner.recall(inside, qdot))
         # The arm does not exceed the limit.
         sent = np.clip(own.smooth, -limit, limit)
         acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16

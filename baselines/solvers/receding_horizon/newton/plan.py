@@ -51,6 +51,7 @@ class PlanWorkspace(NamedTuple):
         kept: The best plan so far.
         drift: Drift of a random guess, in [rad/s] or [m/s]. Shape (n,).
         passed: q̇ Δt of the step that has passed. Shape (n,).
+        away: How far plans of the period before are moved, in [rad] or [m]. Shape (n,).
         grid: Of the plan.
         old_grid: Of the plan of the period before.
     """
@@ -59,6 +60,7 @@ class PlanWorkspace(NamedTuple):
     kept: Plan
     drift: Floats
     passed: Floats
+    away: Floats
     grid: Grid
     old_grid: Grid
 
@@ -67,8 +69,8 @@ class PlanWorkspace(NamedTuple):
 def plan_workspace(kind, m, knots, n, width, limited, clearance):
     """The workspace for plans of ``knots`` knots and ``width`` multipliers a knot; see :func:`newton_workspace`."""
     kept = plan_in(np.empty(knots * (n + width)), knots, n)
-    newton, vectors = newton_workspace(kind, m, knots, n, limited, clearance), np.empty((2, n))
-    return PlanWorkspace(newton, kept, vectors[0], vectors[1], empty_grid(knots), empty_grid(knots))
+    newton, vectors = newton_workspace(kind, m, knots, n, limited, clearance), np.empty((3, n))
+    return PlanWorkspace(newton, kept, vectors[0], vectors[1], vectors[2], empty_grid(knots), empty_grid(knots))
 
 
 @expanded
@@ -86,16 +88,16 @@ def first_part(plan, knots):
 
 @uncounted
 def shift_plan(old_grid, plan, grid, workspace):
-    """Shifts a plan by one step, in place; ``workspace.passed`` is set.
+    """Shifts a plan by one step, and moves it by ``workspace.away``, in place; ``workspace.passed`` is set, too.
 
     The plan has at least as many knots as either grid; the new grid is counted from one step later.
     """
-    shifted = workspace.kept.path
+    shifted, away = workspace.kept.path, workspace.away
     shift_path(old_grid, plan.path, workspace.passed, grid, shifted)
     shift_multipliers(old_grid, plan.multipliers, grid)
     for k in range(grid.at.shape[0]):
         for j in range(plan.path.shape[1]):
-            plan.path[k, j] = shifted[k, j]
+            plan.path[k, j] = shifted[k, j] + away[j]
 
 
 @inner

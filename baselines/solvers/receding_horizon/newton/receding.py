@@ -45,7 +45,7 @@ RETRY = 4
 
 
 class HorizonMemory(NamedTuple):
-    """Memory of the receding horizons of B arms, in two blocks.
+    """Memory of the receding horizons of B arms.
 
     Attributes:
         plans: The plan and, where there is one, the restart candidate, see :func:`plan.plan_in`: joint coordinates at
@@ -53,10 +53,12 @@ class HorizonMemory(NamedTuple):
         counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had (a guess that has a period of its own
             counts as one), initial guesses TRIED so far, and how many periods in a row have ended FAR beyond the
             velocity limits. Shape (B, 4).
+        q: Joint coordinates of the period before, in [rad] or [m]. Shape (B, n).
     """
 
     plans: npt.NDArray[np.float64]
     counts: npt.NDArray[np.int64]
+    q: npt.NDArray[np.float64]
 
 
 PERIODS, CANDIDATE_STEPS, TRIED, FAR = range(4)
@@ -97,7 +99,8 @@ def plan_rows(model, numbers, seen, memory, answer, clearance):
 @uncounted
 def plan_batch(data, settings, observations, memory, answers, clearance, workspace):
     """Plans one period for each of B arms; the settings are :class:`PlanSettings`, other arguments as above."""
-    plans, counts = memory
+    plans, counts, before = memory
+    limited = settings.change_limit.shape[0] > 0
     around = clearance
     for row in range(observations.q.shape[0]):
         q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
@@ -124,6 +127,11 @@ def plan_batch(data, settings, observations, memory, answers, clearance, workspa
         )
         for j in range(q.shape[0]):
             workspace.passed[j] = qdot_before[j] * data.dt
+            # Under limits the plan moves by what drives missed of the command. A jump to the old plan would leave the
+            # acceleration limits, and a few Newton steps of the interior point method do not bring it back within.
+            commanded = before[row, j] + data.dt * qdot_before[j]
+            workspace.away[j] = q[j] - commanded if limited and count[PERIODS] > 0 else 0.0
+            before[row, j] = q[j]
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
         kept = _first_velocity(problem, plans[row, 0], answers.qdot[row])
