@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.status import Status
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import Chain
-from ikgym.kernels.limits import applied
+from ikgym.kernels.limits import ideal
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -124,7 +124,7 @@ def model_of(block):
         block[axes:prismatic].reshape(n, 3),
         block[prismatic:tool] != 0.0,
         block[tool:rotation],
-        block[rotation:].reshape(3, 3),
+        block[rotation : rotation + 9].reshape(3, 3),
     )
     return Model(
         chain,
@@ -164,15 +164,10 @@ def entry(step: Any, numbers: type, memory: type, remembers: bool) -> Any:
         of no elements nothing is cut.
     """
     python = getattr(step, "py_func", step)
+    scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory, "remembers": remembers}
+    call = types.FunctionType(_call.__code__, scope, f"{python.__name__}_call")
     name = f"{python.__name__}_{numbers.__name__}_{memory.__name__}"
-    call = _copy(_call, python.__module__, name, step=step, Numbers=numbers, Memory=memory)
-    return _copy(_remembering_call, python.__module__, f"{name}_remembering", call=call) if remembers else call
-
-
-def _copy(function: Any, module: str, name: str, **scope: Any) -> Any:
-    """A compiled copy of a function, with other globals."""
-    call = types.FunctionType(function.__code__, {**globals(), **scope}, f"{name}_call")
-    call.__module__, call.__qualname__ = module, name
+    call.__module__, call.__qualname__ = python.__module__, f"{name}_remembering" if remembers else name
     return kernel(call)
 
 
@@ -183,31 +178,22 @@ def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, actio
         return REFUSED
     model, n, m = model_of(block), int(block[0]), nominal.shape[1]
     rows = q.shape[0] // n
+    if remembers:  # type: ignore[name-defined]  # noqa: F821
+        last = memory[-1].reshape(-1)
+        for i in range(last.shape[0]):
+            if math.isnan(last[i]):
+                last[i] = qdot[i]
+        qdot, memory = last, memory[:-1]
     ahead = nominal.reshape(rows, nominal.shape[0] // max(rows, 1), m)
     shown = Seen(q.reshape(rows, n), qdot.reshape(rows, n), pose.reshape(rows, m), ahead, remaining)
     out = Answer(*_parts_of(answer, rows, n))
     step(model, Numbers(*numbers), shown, Memory(*memory), out)  # type: ignore[name-defined]  # noqa: F821
     if action.shape[0] == 0:
         return False
-    return cut_rows(out.qdot, model.unit, action.reshape(rows, n), out.status)
-
-
-def _remembering_call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, action: Any, answer: Any) -> Any:
-    """See :func:`entry`; behind the block of the model are the limits of the arm, as :func:`sent_rows` takes them."""
-    q, qdot, pose, nominal, remaining = seen
-    if checking and not all_finite(q, qdot, pose, nominal, remaining):
-        return REFUSED
-    n = int(block[0])
-    size, last = 15 + 11 * n, memory[-1].reshape(-1)
-    for i in range(last.shape[0]):
-        if math.isnan(last[i]):
-            last[i] = qdot[i]
-    result = call(  # type: ignore[name-defined]  # noqa: F821
-        block[:size], numbers, False, (q, last, pose, nominal, remaining), memory[:-1], action, answer
-    )
-    if action.shape[0] > 0:
-        limits, unit = block[size:].reshape((block.shape[0] - size) // n, n), block[3 : 3 + n]
-        sent_rows(limits, block[2], unit, q.reshape(-1, n), action.reshape(-1, n), last.reshape(-1, n))
+    result = cut_rows(out.qdot, model.unit, action.reshape(rows, n), out.status)
+    if remembers:  # type: ignore[name-defined]  # noqa: F821
+        limits = block[15 + 11 * n :].reshape((block.shape[0] - 15) // n - 11, n)
+        sent_rows(limits, model.dt, model.unit, shown.q, action.reshape(rows, n), shown.qdot)
     return result
 
 
@@ -223,15 +209,9 @@ def sent_rows(limits, dt, unit, q, action, last):
         action: Shape (B, n).
         last: Velocities of the step before in [rad/s] or [m/s]; becomes those of this one. Shape (B, n).
     """
-    n = unit.shape[0]
-    command = np.empty(n)
     for row in range(q.shape[0]):
-        for j in range(n):
-            command[j] = action[row, j] * unit[j]
-        if limits.shape[0] > 0:
-            applied(limits, q[row], command, last[row], dt, last[row])
-        else:
-            last[row] = command
+        for j in range(q.shape[1]):
+            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * unit[j], last[row, j], dt)
 
 
 @kernel

@@ -87,21 +87,17 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
 
     def _step(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Memory]:
         """Actions, flat, and the state for the next call."""
-        action, answer, kept, code = self._call(parts, rows, memory, checking)
+        call, block, numbers, n = self._kernel
+        action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
+        kept: Memory = tuple([array.copy() for array in memory])
+        if self.sees_extras:
+            parts, numbers = self._told(parts, numbers)
+        code = call(block, numbers, checking, parts, kept, action, answer)
         if code:
             if code == REFUSED:
                 raise not_finite()
-            kept = self._without_lost(kept, parts_of(answer, rows, self.problem.model.joints)[0])
+            kept = self._without_lost(kept, parts_of(answer, rows, n)[0])
         return action, (answer[:rows], answer[rows : 2 * rows], *kept)
-
-    def _call(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Any, Memory, int]:
-        """Calls the kernel: actions, flat, the block of the answer, the next memory, and the result of the call."""
-        call, block, numbers, n = self._kernel
-        action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
-        kept = tuple([array.copy() for array in memory])
-        if self.sees_extras:
-            parts, numbers = self._told(parts, numbers)
-        return action, answer, kept, call(block, numbers, checking, parts, kept, action, answer)
 
     def _flat(self, parts: Parts) -> Parts:
         """The arrays of a batch as :func:`entry` takes them, and the obstacles as they are, where they are shown."""

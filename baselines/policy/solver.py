@@ -260,7 +260,7 @@ class SolverPolicy(Frozen, abc.ABC):
         if state is None:
             return self.initial_memory(rows)
         if state is self._last[0] and len(state[0]) == rows:
-            memory = remembered(state)
+            memory = state[REPORTED:]
         else:
             memory = checked_memory(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():

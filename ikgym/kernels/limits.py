@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ikgym.kernels.jit import inlined, kernel
+from ikgym.kernels.jit import inlined
 
 # The rows of an arm's limits, see :func:`ikgym.arms.limits.limit_rows`.
 LOWER, UPPER, FASTEST, CHANGE = range(4)
@@ -22,6 +20,13 @@ def within(value, bound):
 
 
 @inlined
+def changed(limits, j, velocity, last):
+    """A velocity of joint ``j`` within its acceleration limit, in [rad/s] or [m/s]; ``last`` is that of before."""
+    most, change = limits[CHANGE, j], velocity - last
+    return last + math.copysign(most, change) if abs(change) > most else velocity
+
+
+@inlined
 def driven(limits, j, command, last, slack, at_limit, row):
     """The velocity that joint ``j`` is driven at: the command within the limits of velocity and acceleration.
 
@@ -34,9 +39,8 @@ def driven(limits, j, command, last, slack, at_limit, row):
         at_limit: Joints held back; those by velocity and by acceleration are counted on. Shape (N, 3).
         row: The arm.
     """
-    allowed, most = within(command, limits[FASTEST, j]), limits[CHANGE, j]
-    change = allowed - last
-    velocity = last + math.copysign(most, change) if abs(change) > most else allowed
+    allowed = within(command, limits[FASTEST, j])
+    velocity = changed(limits, j, allowed, last)
     at_limit[row, 1] += abs(command - allowed) > slack
     at_limit[row, 2] += abs(allowed - velocity) > slack
     return velocity
@@ -60,21 +64,22 @@ def stopped(limits, j, here, reached, dt):
     return stop, within((stop - here) / dt, limits[FASTEST, j])
 
 
-@kernel
-def applied(limits, q, command, last, dt, out):
-    """The joint velocities that limits make of a command, as in a step of the environment.
+@inlined
+def ideal(limits, j, here, command, last, dt):
+    """The velocity of joint ``j`` after a step of an ideal plant, in [rad/s] or [m/s].
 
     Args:
-        limits: Result of :func:`ikgym.arms.limits.limit_rows` for an arm with limits. Shape (4, n).
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-        command: Joint velocities in [rad/s] or [m/s]. Shape (n,).
-        last: Velocity applied in the previous step. Shape (n,).
+        limits: Result of :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
+        j: The joint.
+        here: Its coordinate in [rad] or [m].
+        command: In [rad/s] or [m/s].
+        last: Velocity applied in the previous step, in [rad/s] or [m/s].
         dt: Δt in [s].
-        out: Receives those applied in this one. Shape (n,).
     """
-    held = np.zeros((1, 3))
-    for j in range(q.shape[0]):
-        out[j] = driven(limits, j, command[j], last[j], 0.0, held, 0)
-        reached = q[j] + dt * out[j]
-        if not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-            _, out[j] = stopped(limits, j, q[j], reached, dt)
+    if limits.shape[0] == 0:
+        return command
+    velocity = changed(limits, j, within(command, limits[FASTEST, j]), last)
+    reached = here + dt * velocity
+    if not limits[LOWER, j] <= reached <= limits[UPPER, j]:
+        _, velocity = stopped(limits, j, here, reached, dt)
+    return velocity
