@@ -79,7 +79,8 @@ class Batch(NamedTuple):
 
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]; where a policy remembers it, its last command, see
+            :attr:`SolverPolicy.remembers_command`. Shape (B, n).
         pose: Measured task coordinates. Shape (B, m).
         nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
         remaining: Steps left. Shape (B, 1).

@@ -54,7 +54,8 @@ class RecedingHorizon(CompiledPolicy):
     of them very costly: several ``starts`` and restart candidates are for that.
 
     The limits of the arm and the velocity limit of the scenario are constraints of the plan. Between blocks of a and b
-    steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the velocity last applied by q̈_max Δt. Where
+    steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the last command by q̈_max Δt. Under limits the
+    plan before is moved by what the drives missed of that command, else the arm could not go on along it. Where
     the horizon ends before the episode does, the last knot leaves the way that a stop takes, so that no plan runs into
     a joint limit that it does not see yet; with ``stop_at_end`` nothing comes behind the episode's end. Arms with
     limits of acceleration are planned for by an interior point method, see :mod:`newton.interior_point`: to
