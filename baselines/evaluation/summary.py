@@ -14,11 +14,11 @@ import pandas as pd
 
 from baselines import registry
 from baselines.canonical import canonical, jsonable
+from baselines.evaluation.columns import COLUMNS, geometric
 from baselines.evaluation.metrics import Row
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from baselines.statistics import geometric_interval, geometric_mean
-from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError
 
 #: The quantities by which the episodes of a scenario are compared.
@@ -101,6 +101,7 @@ def _labelled(rows: Iterable[Row]) -> pd.DataFrame:
     out = frame(rows).assign(
         text=[canonical(row.parameters) for row in rows],
         beaten=[row.seed if best_known.beaten(row) else np.nan for row in rows],
+        stopped=[np.nan if row.clearance_min is None else float(row.stopped is not None) for row in rows],
     )
     for scenario, contents in out.groupby("scenario", sort=False)[["fingerprint", "test_set"]]:
         if len(different := contents.drop_duplicates()) > 1:
@@ -113,65 +114,36 @@ def _labelled(rows: Iterable[Row]) -> pd.DataFrame:
     return out.merge(named, on=["scenario", *_POLICY])
 
 
-def _largest(values: pd.Series) -> float:
-    """The largest value; NaN if one is NaN, as that of an arm that diverged."""
-    return float(values.max(skipna=False))
-
-
-#: Each column of a line, the column of episodes that it is made of, and how.
-_COLUMNS: Mapping[str, tuple[str, Any]] = {
+#: Columns of a line that no table shows: the column of episodes that each is made of, and how.
+_ABOUT: Mapping[str, tuple[str, Any]] = {
     "policy": ("policy", "first"),
     "parameters": ("parameters", "first"),
     "steps": ("steps", "first"),
-    "fingerprint": ("fingerprint", "first"),
     "first_seed": ("seed", "first"),
     "machines": ("machine", lambda machines: tuple(map(json.dumps, machines))),
     "beaten": ("beaten", lambda seeds: tuple(seeds.dropna().astype(int))),
     "foresight": ("preview", "max"),
     "seeds": ("text", "nunique"),
-    "episodes": ("seed", "nunique"),
     "rows": ("seed", "size"),
     "noisy": ("noise_seed", "any"),
     "stated": ("acceleration_stated", "all"),
     "unknown": ("cost_ratio", lambda ratios: ratios.isna().sum()),
-    "total_cost": ("total_cost", geometric_mean),
-    "tracking_cost": ("tracking_cost", geometric_mean),
-    "cost_ratio": ("cost_ratio", lambda ratios: geometric_mean(ratios) if ratios.notna().all() else np.nan),
-    "lost": ("lost", "sum"),
-    "followed": ("followed", "sum"),
-    "solver_status": ("solver_status", lambda statuses: max(statuses, key=lambda one: Status[one.upper()])),
-    "position_error": ("position_error_max", _largest),
-    "orientation_error": ("orientation_error_max", _largest),
-    "qdot_peak": ("qdot_peak", _largest),
-    "qddot_peak": ("qddot_peak", _largest),
-    **{name: (name, "sum") for name in (f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))},
-    "time_p50_us": ("time_p50_us", "median"),
-    "time_p99_us": ("time_p99_us", "max"),
-    "deadline_misses": ("deadline_misses", lambda misses: misses.sum(min_count=1)),
-    "path_time_s": ("path_time", _largest),
-    "path_error": ("path_position_error", "max"),
-    "stopped": ("stopped", "count"),
-    "clearance": ("clearance_min", "min"),
 }
 
 
 def _lines(episodes: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    """One line for each group of episodes: :data:`_COLUMNS`, and the spread of the values over the episodes."""
+    """One line for each group of episodes: all columns, and the spread of the values over the episodes."""
     groups = episodes.groupby(keys, sort=False)
-    lines = groups.agg(**{name: how for name, how in _COLUMNS.items() if name not in keys})
+    about = {name: how for name, how in _ABOUT.items() if name not in keys}
+    shown = {key: (column.of or key, column.how) for key, column in COLUMNS.items() if column.how is not None}
+    lines = groups.agg(**about, **shown)
     spread = pd.DataFrame([_spread(label, group) for label, group in groups], index=lines.index)
     lines = lines.join(spread).reset_index()
-    collides = lines.clearance.notna()
     return lines.assign(
         reference=[is_reference(policy) for policy in lines.policy],
-        free_timing=lines.path_error.notna(),
+        free_timing=lines.path_error_mm.notna(),
         lost_percent=100.0 * lines.lost / lines.rows,
-        position_error_mm=1e3 * lines.position_error,
-        orientation_error_mrad=1e3 * lines.orientation_error,
-        path_error_mm=1e3 * lines.path_error,
-        stopped=lines.stopped.where(collides),
-        stopped_percent=(100.0 * lines.stopped / lines.rows).where(collides),
-        clearance_mm=1e3 * lines.clearance,
+        stopped_percent=100.0 * lines.stopped / lines.rows,
     )
 
 
@@ -207,7 +179,7 @@ def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
         episodes.groupby(keys, sort=False, dropna=False)
         .agg(
             cost=("total_cost", geometric_mean),
-            ideal_ratio=("cost_ratio", lambda ratios: geometric_mean(ratios) if ratios.notna().all() else np.nan),
+            ideal_ratio=("cost_ratio", geometric),
         )
         .reset_index()
     )
@@ -220,9 +192,8 @@ def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
     for key, pair in pairs.groupby(_LINE, sort=False):
         if pair[["cost", "cost_plain"]].to_numpy().min() <= 0.0:
             continue
-        factors, ratios = (pair.cost / pair.cost_plain).to_numpy(), pair.ideal_ratio_plain
-        ratio = geometric_mean(ratios) if ratios.notna().all() else np.nan
-        out.append((*key, ratio, geometric_mean(factors), *geometric_interval(factors)))
+        factors = (pair.cost / pair.cost_plain).to_numpy()
+        out.append((*key, geometric(pair.ideal_ratio_plain), geometric_mean(factors), *geometric_interval(factors)))
     return pd.DataFrame(out, columns=[*_LINE, "ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"])
 
 

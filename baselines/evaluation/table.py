@@ -61,6 +61,9 @@ class Column:
     title: str  # its head
     unit: str = ""  # the second line of the head
     about: str = ""  # a description, shown in HTML when the pointer is on the head
+    _: dataclasses.KW_ONLY
+    how: Any = None  # how pandas puts the values of episodes together; None if it does not
+    of: str = ""  # the name of these values; that of the column if left out
     format: Callable[[Any], str] = number  # the text of a value
     drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
     text: Callable[[Any], str] | None = None  # the text of the cell of a line, if it is not that of its value
