@@ -101,6 +101,7 @@ ALLOWED = {
     ("Scenario", "velocity_limit"): ("none",),
     ("Scenario", "model"): ("none",),
     ("Scenario", "steps"): ("none",),
+    ("Scenario", "policy"): ("text",),
     ("Plant", "bandwidth"): ("inf",),
     ("Bodies", "ends"): ("none",),
     ("RandomSinusoid", "amplitude"): ("longer",),

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines import registry
+from baselines.solvers.quadratic_program.qp import QuadraticProgram
+from baselines.solvers.resolved_rate.base import SLOW, velocity_weights
+from baselines.spec import parse_policy
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
@@ -23,6 +26,8 @@ from ikgym.validation import FloatArray
 
 #: The solver that surveys paths, and those that are tried where it does not follow closely.
 PREFERRED, OTHERS = "qp", ("sns", "rhc_foresight")
+#: Powers of the velocity limits that weigh slow joints heavier than `qp` does by default: the last one holds them.
+HEAVIER = (1.6, 4.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,14 +79,22 @@ def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> d
     return {"trajectory": timing(scenario.trajectory), "obstacles": tuple(obstacles)}
 
 
+def with_slow_joints_spared(scenario: Scenario) -> tuple[str, ...]:
+    """`qp` with weights that spare slow joints, as texts for :func:`played`; none where no joint is slow."""
+    weights = [np.ravel(velocity_weights(scenario.model, scenario.largest_qdot, power, SLOW)) for power in HEAVIER]
+    rows = [row for row in weights if np.ptp(row) > 0.0]
+    return tuple(f"{PREFERRED}:joint_weights=[{','.join(f'{one:.4g}' for one in row)}]" for row in rows)
+
+
 def played(scenario: Scenario, starts: FloatArray, solver: str = PREFERRED) -> Motion:
     """A solver on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, these must be clear.
 
-    Gains of `qp` that long control periods do not allow are as large as they may be.
+    A repulsion of `qp` that long control periods do not allow is as large as it may be.
     """
-    rate, gains = 1.0 / scenario.dt, {"secondary_gain": 1.0, "repulsion": 10.0}
-    smaller = {name: rate for name, gain in gains.items() if rate < gain and solver == PREFERRED}
-    policy, rows = registry.make(solver, scenario, **smaller), len(starts)
+    (name, parameters), rate = parse_policy(solver), 1.0 / scenario.dt
+    if name == PREFERRED and rate < QuadraticProgram.repulsion:
+        parameters |= {"repulsion": rate}
+    policy, rows = registry.make(name, scenario, **parameters), len(starts)
     simulator = Simulator(scenario, rows, policy.preview)
     simulator.reset(np.ones(rows, dtype=np.bool_), [seeding.np_random(0)[0]] * rows, starts)
     out, state = simulator.observe(), None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.paths.motion import OTHERS, PREFERRED, Motion
+from baselines.paths.motion import OTHERS, PREFERRED, Motion, with_slow_joints_spared
 from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, followed, survey
 from baselines.paths.timing import Timing
 from ikgym.exceptions import InvalidInputError
@@ -18,6 +18,9 @@ from ikgym.scenarios import Scenario
 SLOWEST, PRECISION = 5.0, 0.01
 #: Most branches that are tried, and how often a timing is worked out again from the motion in the one before.
 TRIED, AGAIN = 4, 2
+
+#: A motion that spares slow joints is taken where it is shorter by this factor.
+WORTHWHILE = 0.95
 
 #: Most branches along which another solver than `qp` is played, and how many times slower, one after the other.
 OTHER_BRANCHES, OTHER_SLOWER = 2, (1.0, 1.3)
@@ -74,7 +77,8 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float
 
     The path in space stays as it is. Where limits bind, it is driven slower than asked, elsewhere as fast as asked.
     A redundant arm moves otherwise at another speed; therefore each timing is played, and made slower where needed.
-    The solver is `qp`; where that does not follow at any speed, as near a singularity, `sns` or `rhc_foresight`. Where
+    The solver is `qp`; where limits bind, and some joints are much slower than others, also with weights that spare
+    these. Where it does not follow at any speed, as near a singularity, it is `sns` or `rhc_foresight`. Where
     none follows so closely, 1 mm and 1 mrad of `qp` will do.
 
     Args:
@@ -98,6 +102,11 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float
 def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
     """The result of :func:`retime`; None where no start leads along the whole path, or no solver follows from any."""
     best = _best(found, FOLLOWED, fastest)
+    if fastest or best is None or best.timing.duration > found.duration:
+        for solver in with_slow_joints_spared(found.scenario):
+            other = _best(survey(found.scenario, reserve=found.reserve, solver=solver), FOLLOWED, fastest)
+            if other and (best is None or other.timing.duration < WORTHWHILE * best.timing.duration):
+                best = other
     if best is None:
         rough = _best(found, REACHED, fastest)
         best = _by_another(found, rough, fastest) or rough
@@ -106,7 +115,7 @@ def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
 
 def _best(found: Survey, errors: Errors, fastest: bool) -> _Candidate | None:
     if not fastest and (motion := found.as_asked(errors)) is not None:
-        return _Candidate(found.best, Timing.uniform(found.duration, 1.0), motion)
+        return _Candidate(found.best, Timing.uniform(found.duration, 1.0), motion, found.solver)
     best: _Candidate | None = None
     for branch in found.branches[:TRIED]:
         best = _faster(found, branch, best, errors, fastest)
@@ -169,9 +178,10 @@ def _faster(found: Survey, branch: Branch, best: _Candidate | None, errors: Erro
 
 
 def _followed(
-    found: Survey, branch: Branch, timing: Timing, errors: Errors, solver: str = PREFERRED
+    found: Survey, branch: Branch, timing: Timing, errors: Errors, solver: str | None = None
 ) -> _Candidate | None:
     """The timing with its motion, if the solver follows."""
+    solver = found.solver if solver is None else solver
     trajectory = timing.of(found.scenario.trajectory)
     motion = followed(found.play(solver, branch.start, trajectory=trajectory), errors)
     return None if motion is None else _Candidate(branch, timing, motion, solver)

@@ -124,12 +124,14 @@ class Survey:
         duration: The time that is asked for, in [s].
         branches: The best first.
         reserve: The share of the limits of velocity and acceleration that motions leave to feedback.
+        solver: The solver of the branches, such as ``"qp"``.
     """
 
     scenario: Scenario
     duration: float
     branches: tuple[Branch, ...]
     reserve: float = 0.0
+    solver: str = PREFERRED
 
     @property
     def best(self) -> Branch:
@@ -146,8 +148,9 @@ class Survey:
         """Whether `qp` follows the path from the best start, in the time that is asked for and within all limits."""
         return self.as_asked() is not None
 
-    def as_asked(self, errors: tuple[float, float] = FOLLOWED, solver: str = PREFERRED) -> Motion | None:
+    def as_asked(self, errors: tuple[float, float] = FOLLOWED, solver: str | None = None) -> Motion | None:
         """The motion of a solver from the best start in the time asked for; None if it errs more, in [m] and [rad]."""
+        solver = self.solver if solver is None else solver
         if not self.best.whole or self.best.slowing > 1.0:
             return None
         if solver not in self._motions:
@@ -188,7 +191,7 @@ def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
     return bool(position <= errors[0] and orientation <= errors[1] and free)
 
 
-def survey(scenario: Scenario, *, reserve: float = 0.0) -> Survey:
+def survey(scenario: Scenario, *, reserve: float = 0.0, solver: str = PREFERRED) -> Survey:
     """Follows a path from several start branches, and times each of them.
 
     Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
@@ -198,6 +201,7 @@ def survey(scenario: Scenario, *, reserve: float = 0.0) -> Survey:
     Args:
         scenario: A scenario whose path is the same at every reset. Its plant is taken to be ideal.
         reserve: The share of the limits of velocity and acceleration that motions leave to feedback, from 0 to 0.9.
+        solver: The solver, as text such as ``"qp:secondary_gain=0"``.
 
     Raises:
         InvalidInputError: The path is random, its first pose is out of reach, none of its postures is clear, or the
@@ -211,32 +215,32 @@ def survey(scenario: Scenario, *, reserve: float = 0.0) -> Survey:
         )
     whole, scenario = scenario, with_reserve(scenario, reserve)
     begin = starts(ideal(scenario))
-    branches = _branches(scenario, begin, 1.0)
+    branches = _branches(scenario, begin, 1.0, solver)
     if sum(branch.whole for branch in branches) < 0.5 * len(branches):
         # Poses that even the slowest play misses are out of reach.
-        _play_again(scenario, branches, [not branch.whole for branch in branches], SLOWEST)
+        _play_again(scenario, branches, [not branch.whole for branch in branches], SLOWEST, solver)
     for factor in SLOWER:
         slowest = [branch.whole and branch.slowing == SLOWEST for branch in branches]
         if sum(slowest) > 0.5 * sum(branch.whole for branch in branches):
-            _play_again(scenario, branches, slowest, factor)
-    return Survey(whole, duration, tuple(sorted(branches, key=Branch.rank)), reserve)
+            _play_again(scenario, branches, slowest, factor, solver)
+    return Survey(whole, duration, tuple(sorted(branches, key=Branch.rank)), reserve, solver)
 
 
-def _play_again(scenario: Scenario, branches: list[Branch], chosen: list[bool], slowing: float) -> None:
+def _play_again(scenario: Scenario, branches: list[Branch], chosen: list[bool], slowing: float, solver: str) -> None:
     """Replaces the chosen branches by those of a slower play, where it reaches the path or is the slowest one."""
     rows = np.flatnonzero(chosen).tolist()
     if rows:
         starts = np.array([branches[row].start for row in rows])
-        for row, branch in zip(rows, _branches(scenario, starts, slowing), strict=True):
+        for row, branch in zip(rows, _branches(scenario, starts, slowing, solver), strict=True):
             if branch.whole or slowing == SLOWEST:
                 branches[row] = branch
 
 
-def _branches(scenario: Scenario, starts: FloatArray, slowing: float) -> list[Branch]:
+def _branches(scenario: Scenario, starts: FloatArray, slowing: float, solver: str) -> list[Branch]:
     """Branches from starts of shape (N, n), played in so many times the time that is asked for."""
     timing = Timing.uniform(path_duration(scenario), slowing)
     dt = timing.duration / min(max(timing.duration / scenario.dt, FEWEST_STEPS), MOST_STEPS)
-    motion = played(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts)
+    motion = played(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts, solver)
     return [branch_of(scenario, motion.of(row), timing) for row in range(len(starts))]
 
 

@@ -194,8 +194,10 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
         how += f" and {_small(motion.orientation_error.max(), 'rad')}"
     if not follows(motion):
         how += f" (no closer, nor do {' and '.join(OTHERS)}: a stop or a singularity is near)"
-    elif driven.solver != PREFERRED:
+    elif driven.solver in OTHERS:
         how += f" (where {PREFERRED} does not: a stop or a singularity is near)"
+    elif driven.solver != PREFERRED:
+        how += " (its slow joints are spared, which takes less time)"
     hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
     used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve else ""
     lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]

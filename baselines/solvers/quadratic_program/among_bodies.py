@@ -189,7 +189,7 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     for j in range(q.shape[0]):
         away[j] -= (1.0 - left) * preferred[j]
         preferred[j] += away[j]
-        linear[j] += weight * away[j]
+        linear[j] += weight * numbers.program.weights[j] * away[j]
     answer.iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
     for j in range(q.shape[0]):
         qdot[j] = x[j]
@@ -197,5 +197,5 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     met = False
     for i in range(count):
         met = met or dot(rows[i], x) <= bounds[i] + MET
-    if found and held_back(jac, shift, weight, preferred, qdot, lower, upper, met):
+    if found and held_back(jac, shift, weight, numbers.program.weights, preferred, qdot, lower, upper, met):
         answer.status[row] = SATURATED

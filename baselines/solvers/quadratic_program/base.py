@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
@@ -14,6 +15,11 @@ from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.arms.limits import middle
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
+
+#: Largest motion to the posture, as a share of the joint motion that the task asks for.
+SECONDARY_SHARE = 0.5
+#: Gains in [1/s] by default, where that motion is limited, and elsewhere.
+SOFT_GAIN, GAIN = 2.5, 1.0
 
 
 class QuadraticProgramNumbers(NamedTuple):
@@ -26,6 +32,8 @@ class QuadraticProgramNumbers(NamedTuple):
         braking_share: Share of the acceleration limit that the feedback reckons with; 0 if it does not.
         rotation_weight: Weight of the rotation against the position, in [m/rad].
         scaling: Whether the task shift is scaled.
+        secondary_share: Largest secondary motion of the joints, as a share of the primary one; inf for any.
+        weights: Weights of the joints. Shape (n,).
         pull: How strongly the joints are led to a posture, in [1/s], and the posture. Shape (2, n).
         limits: See :func:`limits_with_braking`. Shape (5, n).
     """
@@ -36,6 +44,8 @@ class QuadraticProgramNumbers(NamedTuple):
     braking_share: float
     rotation_weight: float
     scaling: bool
+    secondary_share: float
+    weights: FloatArray
     pull: FloatArray
     limits: FloatArray
 
@@ -49,7 +59,9 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: Weight of the joint motion as a share of that of the task. Above 0.
         lm_damping: How much that grows with the error. At least 0.
-        secondary_gain: K in [1/s], at least 0 and below 2/Δt; 0 for the smallest joint velocity.
+        secondary_gain: K in [1/s] of the way to a posture, at least 0 and below 2/Δt; 0 for the smallest joint
+            velocity. Where :attr:`soft`, that motion is at most half as large as the joint motion that reference and
+            error ask for, so that an arm at rest stays at rest. By default 2.5 there, else 1, and at most 1/Δt.
         posture: q* in [rad] or [m]; one number, or one a joint. If left out, the model's home; where it has none, the
             middle of the limits, and joints without limits are left alone.
         braking_share: Share of the acceleration limits that braking at the reference reckons with. At most 1; 0 takes
@@ -57,6 +69,9 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         rotation_weight: Weight of the rotation against the position, in [m/rad]: 1 rad of rotation error counts as
             much as so many metres of position error, where limits do not allow both to vanish. Above 0; it changes
             nothing in tasks without orientation. Skew and matrix coordinates count as rad.
+        joint_weights: w, above 0: how costly the motion of a joint is; only ratios count. One number, or one a joint.
+            If left out, (v_max / v)^1.5 of the largest joint velocities v, so that slow joints do little of what others
+            can do; equal ones where the model has no velocity limits.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -64,24 +79,28 @@ class VelocityProgram(ResolvedRate, abc.ABC):
 
     damping: float = parameter(3e-5, number, above=0.0)
     lm_damping: float = parameter(1e-5, number, at_least=0.0)
-    secondary_gain: float = parameter(1.0, number, at_least=0.0)
+    secondary_gain: float | None = parameter(None, number, at_least=0.0)
     posture: float | Sequence[float] | None = None
+    joint_weights: float | Sequence[float] | None = None
     braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
     rotation_weight: float = parameter(1.0, number, above=0.0)
     _pull: FloatArray = dataclasses.field(init=False, repr=False)
+    _weights: FloatArray = dataclasses.field(init=False, repr=False)
 
     keeps_acceleration: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_secondary_gain(self.secondary_gain)
+        if self.secondary_gain is not None:
+            self.check_secondary_gain(self.secondary_gain)
         target, gains = self._posture()
-        self._settle(_pull=read_only(np.array([gains, target])))
+        self._settle(_pull=read_only(np.array([gains, target])), _weights=self.weights_of(self.joint_weights))
 
     def _posture(self) -> tuple[FloatArray, FloatArray]:
         """Target posture of the joints, and gain in [1/s]. Shapes (n,)."""
         model = self.problem.model
-        everywhere = np.full(model.joints, self.secondary_gain)
+        gain = min(SOFT_GAIN if self.soft else GAIN, 1.0 / self.problem.dt)
+        everywhere = np.full(model.joints, gain if self.secondary_gain is None else self.secondary_gain)
         if self.posture is not None:
             posture = per_joint("posture", self.posture, model.joints)
             object.__setattr__(self, "posture", as_given(self.posture, posture))
@@ -90,6 +109,11 @@ class VelocityProgram(ResolvedRate, abc.ABC):
             return model.home, everywhere
         limited, posture = middle(model)
         return posture, np.where(limited, everywhere, 0.0)
+
+    @property
+    def soft(self) -> bool:
+        """Whether the motion to the posture is limited; among bodies the arm has to give way in time."""
+        return not self.among_bodies
 
     @property
     def _brakes(self) -> bool:
@@ -105,5 +129,14 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         share = self.braking_share if self._brakes else 0.0
         limits = limits_with_braking(self.problem)
         return QuadraticProgramNumbers(
-            self.gain, self.damping, self.lm_damping, share, self.rotation_weight, scaling, self._pull, limits
+            self.gain,
+            self.damping,
+            self.lm_damping,
+            share,
+            self.rotation_weight,
+            scaling,
+            SECONDARY_SHARE if self.soft else math.inf,
+            self._weights,
+            self._pull,
+            limits,
         )

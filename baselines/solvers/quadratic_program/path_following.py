@@ -18,6 +18,7 @@ from baselines.solvers.quadratic_program.path_speed import SEGMENTS, joint_path_
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
     curvature,
+    factorise,
     feedback_share,
     goal_along_path,
     held_back,
@@ -73,7 +74,7 @@ def path_step(model, numbers, seen, memory, answer):
     n, e = q.shape[1], tasks.error_size(model.kind, seen.pose.shape[1])
     hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
     lower, upper, preferred, jac = np.empty(n + 1), np.empty(n + 1), np.empty(n), np.empty((e, n))
-    motion, missing, shift = np.empty(e), np.empty(e), np.empty(e)
+    motion, missing, shift, factor, weights = np.empty(e), np.empty(e), np.empty(e), np.empty((n, n)), program.weights
     for row in range(q.shape[0]):
         samples, steps, progress = memory.samples[row], memory.steps[row], memory.progress[row]
         remember(samples, steps, seen.nominal[row])
@@ -86,19 +87,20 @@ def path_step(model, numbers, seen, memory, answer):
         weigh_rotation(model.kind, program.rotation_weight, jac, motion, missing)
         jac *= dt
         missing *= program.gain
-        weight = motion_weight(jac, missing, program.damping, program.lm_damping, limits[FASTEST])
-        curvature(jac, SCALING_WEIGHT * weight, hessian)
-        if program.braking_share > 0.0:
-            missing *= feedback_share(hessian, jac, missing, program.braking_share, limits[CHANGE])
+        weight = motion_weight(jac, missing, program.damping, program.lm_damping, weights, limits[FASTEST])
+        weight *= SCALING_WEIGHT
+        curvature(jac, weight, weights, hessian)
+        if program.braking_share > 0.0 and factorise(hessian, factor):
+            missing *= feedback_share(factor, jac, missing, program.braking_share, limits[CHANGE])
         least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
-        goals = SCALING_WEIGHT * weight, preferred, speed, least
+        goals = weight, weights, preferred, speed, least
         made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)
         memory.steps[row], memory.progress[row], memory.speed[row] = steps + 1, progress + made, made
         for j in range(n):
             answer.qdot[row, j] = x[j]
         for a in range(e):
             shift[a] = missing[a] + made * motion[a]
-        held = held_back(jac, shift, SCALING_WEIGHT * weight, preferred, answer.qdot[row], lower, upper, False)
+        held = held_back(jac, shift, weight, weights, preferred, answer.qdot[row], lower, upper, False)
         stuck = made <= max(least, STUCK) < speed
         answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
 
@@ -107,13 +109,14 @@ def path_step(model, numbers, seen, memory, answer):
 def _minimum(jacobian, motion, error, goals, program, x):
     """Joint velocities, then s ‖Δx‖, into x (n + 1,); the program's bounds of the joints are set, the rest is not.
 
-    ``goals`` are the weight of the joint motion, preferred joint velocities, the speed to aim at, and the least one.
-    Returns the progress in steps of the reference, the number of solves, and whether the optimum was found.
+    ``goals`` are the weight of the joint motion, those of the joints, preferred joint velocities, the speed to aim at,
+    and the least one. Returns the progress in steps of the reference, the number of solves, and whether the optimum was
+    found.
     """
-    (weight, preferred, speed, least), (hessian, linear, lower, upper), n = goals, program, x.shape[0] - 1
+    (weight, weights, preferred, speed, least), (hessian, linear, lower, upper), n = goals, program, x.shape[0] - 1
     aim, made, iterations, found = speed, least, 0, False
     for _ in range(SOLVES):
-        length = goal_along_path(jacobian, motion, error, weight, preferred, aim, hessian, linear)
+        length = goal_along_path(jacobian, motion, error, weight, weights, preferred, aim, hessian, linear)
         lower[n], upper[n] = least * length, length
         solves, found = box_minimum(hessian, linear, lower, upper, x)
         iterations += solves
@@ -160,7 +163,7 @@ class PathFollowing(VelocityProgram):
     """`qp` with free timing: where limits bind, the arm follows the path more slowly instead of leaving it.
 
     The progress s in one step, from 0 to 1 steps of the reference, is one more variable of the quadratic program:
-    ‖J q̇ Δt − s Δx − e‖² + w (s* − s)² ‖Δx‖² + w ρ ‖q̇ − z‖² is minimised over q̇ and s, with w = 0.01, the motion Δx
+    ‖J q̇ Δt − s Δx − e‖² + w (s* − s)² ‖Δx‖² + w ρ ‖q̇ − z‖²_W is minimised over q̇ and s, with w = 0.01, the motion Δx
     of the reference, and the error e against the reference at the arm's own progress. Path comes before speed, and
     speed before joint motion. Lost time is not made up for: no path is followed faster than it is shown.
 
@@ -174,7 +177,7 @@ class PathFollowing(VelocityProgram):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain, damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight: See
+        gain, damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight, joint_weights: See
             :class:`VelocityProgram`.
         lookahead: How far ahead the reference is seen, in [s]: as long as the arm needs for braking.
         longest_lateness: How far the arm may fall behind the reference, in [s].
@@ -191,6 +194,11 @@ class PathFollowing(VelocityProgram):
 
     name: ClassVar[str] = "qp_path"
     step = path_step
+
+    @property
+    def soft(self) -> bool:
+        """See :attr:`VelocityProgram.soft`: no, since the arm would crawl on where the path leaves its reach."""
+        return False
 
     @property
     def free_timing(self) -> bool:

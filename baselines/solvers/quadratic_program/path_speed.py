@@ -21,7 +21,7 @@ SEGMENTS = 20
 def joint_path_ahead(model, program, samples, first, done, now, q, stride, tangents):
     """Tangents of the joint path along the reference ahead: joint motions in one step of the reference.
 
-    They are the smallest in terms of the largest velocities: a slow joint is left to itself, as at its limit.
+    They are the smallest in terms of the weights of the joints.
 
     Args:
         model: The :class:`Model`.
@@ -38,7 +38,7 @@ def joint_path_ahead(model, program, samples, first, done, now, q, stride, tange
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, move, way, ahead = np.empty((e, n)), np.empty(e), np.empty(e), q.copy()
     hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), program.limits[FASTEST]
-    scale = fastest / fastest.max()
+    weights = program.weights
     for i in range(tangents.shape[0]):
         here = first + i * stride
         tasks.error(model.kind, samples[(here + 1) % length], samples[here % length], move)
@@ -49,16 +49,14 @@ def joint_path_ahead(model, program, samples, first, done, now, q, stride, tange
         forward_and_jacobian(model.chain, ahead, rotation, position, geometric)
         tasks.jacobian(model.kind, rotation, geometric, jacobian)
         weigh_rotation(model.kind, program.rotation_weight, jacobian, move, way)
-        jacobian *= scale
-        weight = motion_weight(jacobian, move, program.damping, 0.0, fastest)
-        curvature(jacobian, weight, hessian)
-        goal(jacobian, move, 0.0, rest, tangents[i])
-        goal(jacobian, way, 0.0, rest, linear)
+        weight = motion_weight(jacobian, move, program.damping, 0.0, weights, fastest)
+        curvature(jacobian, weight, weights, hessian)
+        goal(jacobian, move, 0.0, weights, rest, tangents[i])
+        goal(jacobian, way, 0.0, weights, rest, linear)
         if cholesky(hessian):
             cholesky_solve(hessian, tangents[i])
             cholesky_solve(hessian, linear)
-            tangents[i] *= scale
-            ahead += scale * linear
+            ahead += linear
 
 
 @kernel

@@ -33,25 +33,26 @@ def weigh_rotation(kind, weight, jacobian, motion, error):
 
 
 @uncounted
-def motion_weight(jacobian, error, damping, lm_damping, fastest):
-    """Weight of the squares of the joint velocities against those of the task shift, see :class:`QuadraticProgram`.
+def motion_weight(jacobian, error, damping, lm_damping, weights, fastest):
+    """Weight of the joint motion against the task shift, see :class:`QuadraticProgram`.
 
-    J Δt has shape (e, n), the present error (e,), and the largest joint velocities in [rad/s] or [m/s] (n,).
+    J Δt has shape (e, n), the present error (e,), weights of the joints and their largest velocities in [rad/s] or
+    [m/s] (n,).
     """
     e, n = jacobian.shape
     columns, square, most = 0.0, 0.0, 0.0
     for a in range(e):
         square += error[a] * error[a]
         for j in range(n):
-            columns += jacobian[a, j] * jacobian[a, j]
+            columns += jacobian[a, j] * jacobian[a, j] / weights[j]
     for j in range(n):
         most = max(most, fastest[j])
     return damping * columns / n + lm_damping * square / (most * most)
 
 
 @uncounted
-def curvature(jacobian, weight, hessian):
-    """H = (J Δt)ᵀ J Δt + weight · I, in the upper left corner: shapes (e, n), a number, (n, n) or more."""
+def curvature(jacobian, weight, weights, hessian):
+    """H = (J Δt)ᵀ J Δt + weight · W, in the upper left corner: shapes (e, n), a number, (n,), (n, n) or more."""
     e, n = jacobian.shape
     for i in range(n):
         for j in range(i + 1):
@@ -59,24 +60,30 @@ def curvature(jacobian, weight, hessian):
             for a in range(e):
                 total += jacobian[a, i] * jacobian[a, j]
             hessian[i, j] = hessian[j, i] = total
-        hessian[i, i] += weight
+        hessian[i, i] += weight * weights[i]
 
 
 @inner
-def feedback_share(hessian, jacobian, error, part, changes):
-    """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
-
-    If a joint is too fast for that, all are slowed down by one factor, which keeps the direction. A ``part`` of the
-    largest ``changes`` of the velocity in one step, (n,), is reckoned with; H has shape (n, n), J Δt (e, n).
-    """
-    n = jacobian.shape[1]
-    factor, qdot, share = np.empty((n, n)), np.empty(n), 1.0
-    transposed_product(jacobian, error, qdot)
+def factorise(hessian, factor):
+    """The Cholesky factor of the upper left corner of H, of shape (n, n); whether it is positive definite."""
+    n = factor.shape[0]
     for i in range(n):
         for j in range(i + 1):
             factor[i, j] = hessian[i, j]
-    if not cholesky(factor):
-        return share
+    return cholesky(factor)
+
+
+@inner
+def feedback_share(factor, jacobian, error, part, changes):
+    """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
+
+    If a joint is too fast for that, all are slowed down by one factor, which keeps the direction. A ``part`` of the
+    largest ``changes`` of the velocity in one step, (n,), is reckoned with; the factor of H has shape (n, n), J Δt
+    (e, n).
+    """
+    n = jacobian.shape[1]
+    qdot, share = np.empty(n), 1.0
+    transposed_product(jacobian, error, qdot)
     cholesky_solve(factor, qdot)
     for j in range(n):
         speed, change = abs(qdot[j]), part * changes[j]
@@ -85,24 +92,57 @@ def feedback_share(hessian, jacobian, error, part, changes):
     return share
 
 
+@inner
+def limit_secondary(factor, jacobian, motion, error, share, weight, weights, preferred):
+    """Limits preferred joint velocities to those that leave the task alone, and to a share of the primary motion.
+
+    So the secondary motion begins and ends with that of the reference, and its accelerations are a share of those that
+    the reference needs. An arm that has lost its reference moves to its posture freely.
+
+    Args:
+        factor: The Cholesky factor of H. Shape (n, n).
+        jacobian: J Δt. Shape (e, n).
+        motion: Motion of the reference in one step. Shape (e,).
+        error: The present error. Shape (e,).
+        share: Largest secondary motion, as a share of the primary one.
+        weight: See :func:`motion_weight`.
+        weights: Those of the joints. Shape (n,).
+        preferred: Preferred joint velocities, changed in place. Shape (n,).
+    """
+    n = jacobian.shape[1]
+    primary, secondary, most, size = np.empty(n), np.empty(n), 0.0, 0.0
+    transposed_product(jacobian, motion + error, primary)
+    cholesky_solve(factor, primary)
+    for j in range(n):
+        secondary[j] = weight * weights[j] * preferred[j]
+    cholesky_solve(factor, secondary)
+    for j in range(n):
+        most += weights[j] * primary[j] ** 2
+        size += weights[j] * secondary[j] ** 2
+    shorter = share * math.sqrt(most / size) if size > share * share * most else 1.0
+    for j in range(n):
+        preferred[j] = shorter * secondary[j]
+
+
 @uncounted
-def goal(jacobian, shift, weight, preferred, linear):
-    """The vector g = (J Δt)ᵀ Δx + weight · preferred velocities: shapes (e, n), (e,), a number, (n,), (n,)."""
+def goal(jacobian, shift, weight, weights, preferred, linear):
+    """The vector g = (J Δt)ᵀ Δx + weight · W z: shapes (e, n), (e,), a number, (n,), (n,), (n,)."""
     e, n = jacobian.shape
     for j in range(n):
-        linear[j] = weight * preferred[j]
+        linear[j] = weight * weights[j] * preferred[j]
         for a in range(e):
             linear[j] += jacobian[a, j] * shift[a]
 
 
 @uncounted
-def goal_to_scale(jacobian, shift, weight, preferred, aim, hessian, linear):
+def goal_to_scale(jacobian, shift, weight, weights, preferred, aim, hessian, linear):
     """The same where the task shift is s Δx: s ‖Δx‖, between 0 and ‖Δx‖, is one more variable, the last.
 
     Args:
         jacobian: J Δt. Shape (e, n).
         shift: Δx. Shape (e,).
         weight: See :func:`motion_weight`.
+        weights: Those of the joints. Shape (n,).
         preferred: Preferred joint velocities. Shape (n,).
         aim: The s that is aimed at; the error that the arm rather takes on than stand still; and the largest ‖Δx‖ that
             counts as standing still.
@@ -118,7 +158,7 @@ def goal_to_scale(jacobian, shift, weight, preferred, aim, hessian, linear):
     length = math.sqrt(length)
     moves = length > still
     for j in range(n):
-        linear[j] = weight * preferred[j]
+        linear[j] = weight * weights[j] * preferred[j]
         along = 0.0
         for a in range(e):
             along += jacobian[a, j] * shift[a]
@@ -130,12 +170,12 @@ def goal_to_scale(jacobian, shift, weight, preferred, aim, hessian, linear):
 
 
 @uncounted
-def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear):
+def goal_along_path(jacobian, motion, error, weight, weights, preferred, speed, hessian, linear):
     """The same where the task shift is s Δx + e, with the motion Δx along a path and a speed s that is aimed at.
 
     ``error`` is e, of shape (e,), and ``speed`` from 0 to 1; for the others see :func:`goal_to_scale`.
     """
-    length = goal_to_scale(jacobian, motion, weight, preferred, (speed, TAKEN_ON, STILL), hessian, linear)
+    length = goal_to_scale(jacobian, motion, weight, weights, preferred, (speed, TAKEN_ON, STILL), hessian, linear)
     e, n = jacobian.shape
     for a in range(e):
         for j in range(n):
@@ -145,12 +185,12 @@ def goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, 
 
 
 @uncounted
-def held_back(jacobian, shift, weight, preferred, qdot, lower, upper, bound):
+def held_back(jacobian, shift, weight, weights, preferred, qdot, lower, upper, bound):
     """Whether a bound is met, of a joint or as ``bound`` says, and the task error left weighs more than the motion."""
     (e, n), left, motion = jacobian.shape, 0.0, 0.0
     for j in range(n):
         bound |= qdot[j] == lower[j] or qdot[j] == upper[j]
-        motion += weight * (qdot[j] - preferred[j]) ** 2
+        motion += weight * weights[j] * (qdot[j] - preferred[j]) ** 2
     for a in range(e):
         missing = shift[a]
         for j in range(n):
@@ -159,7 +199,7 @@ def held_back(jacobian, shift, weight, preferred, qdot, lower, upper, bound):
     return bound and left > motion
 
 
-@uncounted
+@inner
 def row_program(model, numbers, q, last, jacobian, motion, error, preferred, program):
     """The program of one arm: its bounds, H and g; the task shift takes the place of the motion of the reference.
 
@@ -185,17 +225,22 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         error[a] *= numbers.gain
         for j in range(q.shape[0]):
             jacobian[a, j] *= model.dt
-    weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, numbers.limits[FASTEST])
+    weights, n, share = numbers.weights, q.shape[0], 1.0
+    weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, weights, numbers.limits[FASTEST])
     weight *= SCALING_WEIGHT if numbers.scaling else 1.0
-    curvature(jacobian, weight, hessian)
-    share = 1.0
-    if numbers.braking_share > 0.0:
-        share = feedback_share(hessian, jacobian, error, numbers.braking_share, numbers.limits[CHANGE])
+    curvature(jacobian, weight, weights, hessian)
+    factor = np.empty((n, n))
+    definite = factorise(hessian, factor)
+    if definite and numbers.braking_share > 0.0:
+        share = feedback_share(factor, jacobian, error, numbers.braking_share, numbers.limits[CHANGE])
+    if definite and numbers.secondary_share < math.inf:
+        limit_secondary(factor, jacobian, motion, error, numbers.secondary_share, weight, weights, preferred)
     for a in range(error.shape[0]):
         error[a] *= share
         motion[a] += error[a]
     if numbers.scaling:
-        upper[q.shape[0]] = goal_to_scale(jacobian, motion, weight, preferred, (1.0, 0.0, 0.0), hessian, linear)
+        aim = 1.0, 0.0, 0.0
+        upper[n] = goal_to_scale(jacobian, motion, weight, weights, preferred, aim, hessian, linear)
     else:
-        goal(jacobian, motion, weight, preferred, linear)
+        goal(jacobian, motion, weight, weights, preferred, linear)
     return weight

@@ -40,7 +40,7 @@ def qp_step(model, numbers, seen, memory, answer):
         for j in range(n):
             qdot[row, j] = x[j]
         status[row] = APPLIED if found else LIMIT
-        if found and held_back(jac, shift, weight, preferred, qdot[row], lower, upper, False):
+        if found and held_back(jac, shift, weight, numbers.weights, preferred, qdot[row], lower, upper, False):
             status[row] = SATURATED
 
 
@@ -48,21 +48,24 @@ def qp_step(model, numbers, seen, memory, answer):
 class QuadraticProgram(VelocityProgram):
     """Minimises task error and joint motion under the limits of position, velocity and acceleration, at each step.
 
-    The joint velocity is the minimum of ‖J q̇ Δt − Δx‖² + ρ ‖q̇ − z‖², where z = K (q* − q) leads to a posture. All
-    limits are bounds of q̇, see :func:`velocity_box`: those of velocity, of the change of the velocity, and the velocity
-    towards a stop from which the joint can still brake. The program in n variables with bounds is solved by an active
-    set, exactly (:func:`box_minimum`).
+    The joint velocity is the minimum of ‖J q̇ Δt − Δx‖² + ρ ‖q̇ − z‖²_W, where ‖y‖²_W = Σ w_j y_j² and z leads to a
+    posture. All limits are bounds of q̇, see :func:`velocity_box`: those of velocity, of the change of the velocity, and
+    the velocity towards a stop from which the joint can still brake. The program in n variables with bounds is solved
+    by an active set, exactly (:func:`box_minimum`).
 
-    ρ = damping · mean ‖J_j Δt‖² + lm_damping · ‖e‖² / v², with the columns J_j, the present error e and the largest
-    joint velocity v: numbers that suit arms of any size. The second part is the damping of Levenberg and Marquardt
-    (Sugihara 2011), next to nothing on the path; without it an arm that was led out of its reach swings through the
-    stretched posture, and may come back with its elbow bent the other way.
+    ρ = damping · mean ‖J_j Δt‖² / w_j + lm_damping · ‖e‖² / v², with the columns J_j, the weights w_j of the joints,
+    the present error e and the largest joint velocity v: numbers that suit arms of any size. The second part is the
+    damping of Levenberg and Marquardt (Sugihara 2011), next to nothing on the path; without it an arm that was led out
+    of its reach swings through the stretched posture, and may come back with its elbow bent the other way.
+
+    z is K (q* − q) without what would move the task, at most half of the joint motion that the reference asks for, in
+    the norm of W: the posture is approached while the arm moves along its path, at both ends of which z vanishes.
 
     The share of the present error that is taken back is made smaller where the joints could not brake in time once it
     is gone. Without that an arm with acceleration limits swings about a reference that it has lost.
 
     With `task_scaling` the task shift is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
-    w ρ ‖q̇ − z‖² is minimised over q̇ and s, with w = 0.01, so that direction comes before length, and length before
+    w ρ ‖q̇ − z‖²_W is minimised over q̇ and s, with w = 0.01, so that direction comes before length, and length before
     joint motion. Where the bounds allow s Δx, the motion leaves its line by (1 − s) ‖Δx‖ / 10 at most, mostly by much
     less. The price is singularities, where the arm may stand still or lead its joints astray.
 
@@ -83,7 +86,8 @@ class QuadraticProgram(VelocityProgram):
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight: See :class:`VelocityProgram`.
+        damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight, joint_weights: See
+            :class:`VelocityProgram`.
         task_scaling: Whether to keep the direction of the task velocity.
         clearance: Distance that bodies keep from each other and from obstacles, in [m]. At least 0.
         influence: Distance d* from which on they are slowed down, in [m]. Above `clearance`.

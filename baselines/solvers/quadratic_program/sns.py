@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, read_only
 
 SATURATED = int(Status.SATURATED)
 NONE = -1
@@ -92,11 +93,13 @@ class SaturationNumbers(NamedTuple):
     Attributes:
         gain: Share of the present error that is taken back in one step.
         damping: See :class:`SaturationInNullSpace`.
+        reach: Roots of the inverse weights of the joints. Shape (n,).
         limits: See :func:`limits_with_braking`. Shape (5, n).
     """
 
     gain: float
     damping: float
+    reach: FloatArray
     limits: FloatArray
 
 
@@ -106,12 +109,16 @@ def sns_step(model, numbers, seen, memory, answer):
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, numbers.limits, model.dt
+    reach = numbers.reach
     lower, upper = np.empty(q.shape[1]), np.empty(q.shape[1])
     for row in range(q.shape[0]):
         velocity_box(limits, dt, q[row], last[row], lower, upper)
         jac = jacobian[row]
-        jac *= dt
+        jac *= dt * reach
+        lower /= reach
+        upper /= reach
         iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
+        qdot[row] *= reach
         status[row] = SATURATED if scaled else APPLIED
 
 
@@ -126,25 +133,32 @@ class SaturationInNullSpace(ResolvedRate):
     the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
     status is ``saturated`` where the task velocity was scaled down.
 
-    The pseudoinverse is damped, since the arm would stop in every singularity; that is no part of the source. A task
-    that has lost rank in all joints is scaled only where it loses more.
+    The pseudoinverse is damped, since the arm would stop in every singularity, and the joints are weighted; neither is
+    part of the source. A task that has lost rank in all joints is scaled only where it loses more.
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
-        damping: Added to the squared singular values of J, as a share of the mean of ‖J_j‖² over the joints j. Smaller
-            squares count as lost rank. At least 0; then those below rounding do, and are left out.
+        damping: Added to the squared singular values of J W^-½, as a share of the mean of ‖J_j‖² / w_j over the joints
+            j. Smaller squares count as lost rank. At least 0; then those below rounding do, and are left out.
+        joint_weights: See :class:`VelocityProgram`.
 
     Raises:
         InvalidInputError: A number is out of its range.
     """
 
     damping: float = parameter(3e-5, number, at_least=0.0)
+    joint_weights: float | Sequence[float] | None = None
+    _reach: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "sns"
     keeps_acceleration: ClassVar[bool] = True
     step = sns_step
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(_reach=read_only(1.0 / np.sqrt(self.weights_of(self.joint_weights))))
+
     def numbers(self) -> SaturationNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return SaturationNumbers(self.gain, self.damping, limits_with_braking(self.problem))
+        return SaturationNumbers(self.gain, self.damping, self._reach, limits_with_braking(self.problem))

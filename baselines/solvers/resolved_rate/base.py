@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,13 +14,18 @@ from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.parameters import parameter
 from baselines.status import Status
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, per_joint
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
+# Joints count as slow below this share of the largest velocity, and how much costlier they are by default, see
+# :func:`velocity_weights`. On paths of arms with slow torsos a power of 1 leaves them at their limits, and with 2 the
+# other joints come near to singularities.
+SLOW, SLOWNESS = 1.0 / 3.0, 1.1
 
 
 class NominalMemory(NamedTuple):
@@ -64,6 +70,16 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
             limit = 2.0 / self.problem.dt
             raise InvalidInputError(f"{name}: expected a number below 2/Δt = {limit:g}, got {gain:g}.")
 
+    def weights_of(self, joint_weights: float | Sequence[float] | None) -> FloatArray:
+        """The parameter `joint_weights` as an array; by the velocity limits if left out. Shape (n,).
+
+        Raises:
+            InvalidInputError: See :func:`check_weights`.
+        """
+        usual = velocity_weights(self.problem.model, self.problem.largest_qdot, SLOWNESS, SLOW)
+        given = usual if joint_weights is None else joint_weights
+        return check_weights("joint_weights", given, self.problem.model.joints)
+
     def memory(self, rows: int) -> Memory:
         """A :class:`NominalMemory` without a step before."""
         return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
@@ -72,6 +88,33 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
     def full_rank(self) -> int:
         """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
         return min(self.problem.task.error_size, self.problem.model.joints, 6)
+
+
+def velocity_weights(arm: Arm, fastest: FloatArray, power: float, slow: float = 1.0) -> float | tuple[float, ...]:
+    """Weights of the joints by their largest velocities v, (v_max / v)^power; 1 for all where the arm has no limits.
+
+    Args:
+        arm: The arm.
+        fastest: v in [rad/s] or [m/s]. Shape (n,).
+        power: 2 measures joint motions in terms of the largest velocities, 0 weighs all joints alike.
+        slow: Joints with at least this share of v_max weigh 1.
+    """
+    if not np.isfinite(arm.velocity_limit).any():
+        return 1.0
+    ratio = fastest.max() / fastest
+    return tuple(np.where(slow * ratio > 1.0, ratio**power, 1.0).tolist())
+
+
+def check_weights(name: str, weights: float | Sequence[float], joints: int) -> FloatArray:
+    """Weights of the joints. Shape (n,).
+
+    Raises:
+        InvalidInputError: One is not above 0, or they are too few or too many.
+    """
+    array = per_joint(name, weights, joints)
+    if not (array > 0.0).all():
+        raise InvalidInputError(f"{name}: expected numbers above 0, got {array.tolist()}.")
+    return array
 
 
 @inner

@@ -8,10 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from baselines.policy import Problem
+from baselines.solvers.resolved_rate.base import check_weights, velocity_weights
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose, PseudoinverseNumbers
-from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, as_given, per_joint, read_only
+from ikgym.validation import FloatArray, as_given, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -42,20 +41,11 @@ class WeightedPseudoinverse(MoorePenrose):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = _by_velocity(self.problem) if self.weights is None else self.weights
-        weights = per_joint("weights", given, self.problem.model.joints)
-        if not (weights > 0.0).all():
-            raise InvalidInputError(f"weights: expected numbers above 0, got {weights.tolist()}.")
+        by_velocity = velocity_weights(self.problem.model, self.problem.largest_qdot, 2.0)
+        given = by_velocity if self.weights is None else self.weights
+        weights = check_weights("weights", given, self.problem.model.joints)
         self._settle(weights=as_given(given, weights), _root=read_only(np.sqrt(weights)))
 
     def numbers(self) -> PseudoinverseNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
         return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, self._root)
-
-
-def _by_velocity(problem: Problem) -> float | tuple[float, ...]:
-    """Weights by the velocity limits of a model, the fastest joint's being 1; 1 for all where it has no limits."""
-    if not np.isfinite(problem.model.velocity_limit).any():
-        return 1.0
-    fastest = problem.largest_qdot
-    return tuple(((fastest.max() / fastest) ** 2).tolist())

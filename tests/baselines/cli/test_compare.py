@@ -27,7 +27,7 @@ def test_a_short_path(capsys, tmp_path):
     rows, text = compared("ur10", tmp_path / "short.csv", capsys, "--speed", "0.1", "--dt", "0.01")
     assert rows["qp", "as it is"] == "yes"
     assert ("sns", "late drives") in rows
-    assert re.search(r"^Recommended: (qp|sns)\.", text, re.MULTILINE)
+    assert re.search(r"^Recommended: (qp|sns|rhc_foresight)\.", text, re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import pytest
 
 import ikgym
 from baselines import Controller, Drives
+from baselines.controller.guards import Guards
 from docs.loop import peaks, played, with_drives
 from tests.baselines.controller.circles import circle
 
@@ -18,7 +19,9 @@ def check(controller, scenario, drives, first=1.0):
     errors, commands = played(controller, with_drives(scenario, drives))
     assert controller.stopped is None
     assert errors[round(first / scenario.dt) :].max() < 1e-4
-    assert (np.abs(commands).max(axis=0) < 1.3 * peaks(scenario)).all()
+    # The inverse of a lag that is guessed may take one period at the acceleration limit, whatever the joint needs.
+    step = 1.01 * scenario.dt * Guards().acceleration(scenario.model)
+    assert (np.abs(commands).max(axis=0) < np.maximum(1.3 * peaks(scenario), step)).all()
 
 
 @pytest.mark.parametrize(("name", "dt", "delay"), [("panda", 1e-3, 2), ("pr2", 4e-3, 3), ("ur10", 4e-3, 0)])
@@ -55,7 +58,9 @@ def test_wrong_drives_are_followed_late_and_calmly():
     scenario = circle("panda", 4e-3, seconds=2.0)
     errors, commands = played(Controller(scenario, drives=Drives(0, LAG)), with_drives(scenario, Drives(12, LAG)))
     assert 1e-5 < errors[250:].max() < 0.1 * (12 * scenario.dt + LAG)
-    assert (np.abs(commands).max(axis=0) < 1.3 * peaks(scenario)).all()
+    # The inverse of a lag that is guessed may take one period at the acceleration limit, whatever the joint needs.
+    step = 1.01 * scenario.dt * Guards().acceleration(scenario.model)
+    assert (np.abs(commands).max(axis=0) < np.maximum(1.3 * peaks(scenario), step)).all()
 
 
 def test_the_longest_drives_that_are_found():

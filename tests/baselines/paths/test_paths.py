@@ -18,7 +18,7 @@ from ikgym.exceptions import InvalidInputError
 def check_driven(retimed):
     """The environment plays what was promised: on the path, within all limits, nobody held back."""
     scenario = retimed.scenario
-    tracking = baselines.track(scenario, "qp")
+    tracking = baselines.track(scenario, retimed.solver)
     assert tracking.position_error.max() <= FOLLOWED[0]
     assert np.nan_to_num(tracking.orientation_error).max() <= FOLLOWED[1]
     q, qdot, arm = tracking.q, tracking.qdot, scenario.arm

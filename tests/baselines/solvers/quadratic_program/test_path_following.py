@@ -37,8 +37,9 @@ def test_is_the_minimum_that_it_states(scale):
         weight, speed, least = 10 ** rng.uniform(-10, -7), rng.uniform(0, 1), rng.choice([0.0, 0.3])
         lower, upper = np.append(-rng.uniform(0, 1, n), 0.0), np.append(rng.uniform(0, 1, n), 0.0)
         hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
-        curvature(jacobian, weight, hessian)
-        length = goal_along_path(jacobian, motion, error, weight, preferred, speed, hessian, linear)
+        weights = rng.uniform(0.1, 10.0, n)
+        curvature(jacobian, weight, weights, hessian)
+        length = goal_along_path(jacobian, motion, error, weight, weights, preferred, speed, hessian, linear)
         if length == 0.0:
             assert np.linalg.norm(motion) < STILL
             continue
@@ -46,8 +47,12 @@ def test_is_the_minimum_that_it_states(scale):
         assert box_minimum(hessian, linear, lower, upper, x)[1]
         pull = np.sqrt(max(1e-2, TAKEN_ON / length))  # of the speed
         rows = np.zeros((e + n + 1, n + 1))
-        rows[:e], rows[e:-1, :n], rows[-1, n] = np.c_[jacobian, -motion / length], weight**0.5 * np.eye(n), pull
-        wanted = np.concatenate([error, weight**0.5 * preferred, [pull * speed * length]])
+        rows[:e], rows[e:-1, :n], rows[-1, n] = (
+            np.c_[jacobian, -motion / length],
+            np.diag((weight * weights) ** 0.5),
+            pull,
+        )
+        wanted = np.concatenate([error, (weight * weights) ** 0.5 * preferred, [pull * speed * length]])
         theirs = lsq_linear(rows, wanted, (lower, upper), method="bvls", tol=1e-15, max_iter=1000).x
         np.testing.assert_allclose(x[:n], theirs[:n], rtol=0, atol=1e-5)
         np.testing.assert_allclose(x[n] / length, theirs[n] / length, rtol=0, atol=1e-5)

@@ -39,7 +39,15 @@ def states(scenario, rows, far, seed=0):
     return Batch(q, last, pose, nominal[:, None], np.ones((rows, 1))), NominalMemory(before, np.ones(rows, np.bool_))
 
 
-def program(policy, batch, memory, i):
+def secondary(policy, q, hessian, weight, primary):
+    """The motion z to the posture: without what moves the task, at most half as large as the primary one, in W."""
+    (gain, posture), joints = policy.numbers().pull, policy.numbers().weights
+    z = np.linalg.solve(hessian, weight * joints * gain * (posture - q))
+    larger = np.sqrt((joints * z**2).sum() / (joints * primary**2).sum()) / 0.5
+    return z / max(larger, 1.0)
+
+
+def program(policy, batch, memory, i, scale=1.0):
     """The least squares of the docstring, for row i, without braking: matrix, goal, bounds, J Δt and Δx."""
     problem, model = policy.problem, policy.problem.model
     rotation, _, geometric = model.forward_and_jacobian(batch.q[i])
@@ -49,14 +57,14 @@ def program(policy, batch, memory, i):
     turning = {"position": slice(0, 0), "pose": slice(3, 6), "axis": slice(3, 5)}
     for rows in (jacobian, error, shift):
         rows[turning.get(problem.task.name, slice(0, len(error) - 3))] *= policy.rotation_weight
-    rho = policy.damping * np.sum(jacobian**2) / model.joints
+    joints = policy.numbers().weights
+    rho = policy.damping * np.sum(jacobian**2 / joints) / model.joints
     rho += policy.lm_damping * (error @ error) / problem.largest_qdot.max() ** 2
     lower, upper = np.empty(model.joints), np.empty(model.joints)
     velocity_box(limits_with_braking(problem), problem.dt, batch.q[i], batch.qdot[i], lower, upper)
-    posture = np.zeros(model.joints) if policy.posture is None else np.asarray(policy.posture)
-    root = np.sqrt(rho) * np.eye(model.joints)
-    matrix = np.vstack([jacobian, root])
-    goal = np.concatenate([shift, root @ (policy.secondary_gain * (posture - batch.q[i]))])
+    hessian, root = jacobian.T @ jacobian + scale * rho * np.diag(joints), np.diag(np.sqrt(rho * joints))
+    z = secondary(policy, batch.q[i], hessian, scale * rho, np.linalg.solve(hessian, jacobian.T @ shift))
+    matrix, goal = np.vstack([jacobian, root]), np.concatenate([shift, root @ z])
     return matrix, goal, (lower, upper), jacobian, shift
 
 
@@ -77,7 +85,7 @@ def minimum(matrix, goal, lower, upper):
     return lsq_linear(matrix, goal, (lower - fixed, upper + fixed), **BVLS).x
 
 
-@pytest.mark.parametrize(("far", "rotation_weight"), [(0.3, 1.0), (3.0, 0.2)])
+@pytest.mark.parametrize(("far", "rotation_weight"), [(0.6, 1.0), (3.0, 0.2)])
 @pytest.mark.parametrize("on", SCENARIOS)
 def test_is_the_minimum_that_it_states(on, far, rotation_weight):
     numbers = {"damping": 1e-3, "lm_damping": 1e-2, "posture": 0.3, "secondary_gain": 2.0, "gain": 0.7}
@@ -100,7 +108,7 @@ def test_scaling_is_the_minimum_that_it_states(on):
     batch, memory = states(scenario, 25, 4.0, seed=2)
     solution = policy.solve(batch, memory)
     for i in range(25):
-        matrix, goal, (lower, upper), jacobian, shift = program(policy, batch, memory, i)
+        matrix, goal, (lower, upper), jacobian, shift = program(policy, batch, memory, i, scale=1e-2)
         weight, e = 1e-2, len(shift)
         length = np.linalg.norm(shift, keepdims=True)
         rows = [np.hstack([jacobian, -shift[:, None] / length]), weight**0.5 * np.eye(1, len(lower) + 1, len(lower))]
@@ -170,11 +178,12 @@ def test_braking_comes_back_to_a_lost_reference_without_swinging():
     assert dead_beat[-1] > 1e-2
 
 
-def test_the_null_space_leads_home():
-    home = circle()
-    still = ikgym.trajectories.Sinusoid(np.zeros(7), offset=home.arm.home)
-    scenario = home.replace(trajectory=still, start=None, steps=100)
-    assert np.abs(played(scenario).qdot).max() < 1e-6
-    away = played(scenario, posture=tuple(home.arm.home + 0.2 * np.eye(7)[0]))
-    assert away.position_error.max() < 1e-6
-    assert np.linalg.norm(away.qdot[-1]) > 0.01
+def test_the_posture_is_approached_in_motion_and_left_alone_at_rest():
+    scenario = circle()
+    posture = scenario.arm.home + 0.2 * np.eye(7)[0]
+    still = ikgym.trajectories.Sinusoid(np.zeros(7), offset=scenario.arm.home)
+    rest = scenario.replace(trajectory=still, start=None, steps=100)
+    assert np.abs(played(rest, posture=tuple(posture)).qdot).max() < 1e-6
+    led, free = (played(scenario, posture=tuple(posture), secondary_gain=gain) for gain in (None, 0.0))
+    assert led.position_error.max() < 1e-6
+    assert np.linalg.norm(led.q[-1] - posture) < np.linalg.norm(free.q[-1] - posture) - 0.01
