@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,9 @@ from ikgym.validation import (
     frozen_array,
     shortened,
 )
+
+#: Fields that say nothing of the geometry.
+FACTS = frozenset(("name", "lower", "upper", "velocity_limit", "acceleration_limit", "home"))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -78,7 +81,8 @@ class Arm(Frozen):
     joint_names: Sequence[str] = ()
     bodies: Bodies = Bodies()  # noqa: RUF009  # frozen
     chain: Chain = dataclasses.field(init=False, repr=False)
-    #: The URDF file that the arm was read from, None for all other arms and for changed copies.
+    #: The URDF file that the arm was read from, None for all other arms and for copies that differ by more than
+    #: :data:`FACTS`.
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
@@ -115,6 +119,13 @@ class Arm(Frozen):
         if self.home is not None:
             self._settle(home=frozen_array("home", self.home, (n,)))
             self.check_posture("home", self.home)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, see :meth:`Frozen.replace`; limits, home and name keep :attr:`urdf`."""
+        copy = super().replace(**changes)
+        if FACTS.issuperset(changes):
+            object.__setattr__(copy, "urdf", self.urdf)
+        return copy
 
     @property
     def joints(self) -> int:

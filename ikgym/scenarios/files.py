@@ -5,16 +5,18 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import logging
 import os
 import pathlib
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ikgym import arms, files, tasks
 from ikgym.arms import Arm
+from ikgym.arms.arm import FACTS
 from ikgym.arms.bodies import Bodies
 from ikgym.arms.checks import numbered_joints
 from ikgym.cost import ProximityCost, TrackingCost
@@ -30,6 +32,8 @@ from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
 from ikgym.trajectories.paths import PATHS, Path
 from ikgym.trajectories.time_laws import TIME_LAWS
 from ikgym.validation import known_names
+
+logger = logging.getLogger("ikgym")
 
 Table = dict[str, Any]
 
@@ -122,7 +126,13 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
             elif isinstance(packages, list):
                 given["packages"] = [folder / one if isinstance(one, str) else one for one in packages]
         arm = make(**given)
-        return arm.replace(**changes) if changes else arm
+        changed = arm.replace(**changes) if changes else arm
+    if arm.urdf is not None and changed.urdf is None:
+        keys = ", ".join(sorted(changes.keys() - FACTS))
+        logger.warning(
+            "[%s] %s: the arm differs from its file %s, whose meshes are not shown.", where, keys, arm.urdf.file
+        )
+    return changed
 
 
 def _choice(kinds: Mapping[str, Any], table: Table) -> Any:
@@ -230,20 +240,22 @@ def _plain_arm(arm: Arm, folder: pathlib.Path) -> str | Table:
 
 
 def _urdf(arm: Arm, folder: pathlib.Path) -> Table | None:
-    """A reference to the URDF file of an arm; None where there is none, or it has changed since."""
+    """A reference to the URDF file of an arm, with what it states otherwise; None where there is none, or it moved."""
     if arm.urdf is None:
         return None
     names = ("base", "tip", "tool", "tool_rotation", "meshes", "packages", "bodyless")
     where: Table = {name: getattr(arm.urdf, name) for name in names}
     try:
-        if not _same(arm, arms.from_urdf(arm.urdf.file, name=arm.name, **where)):
+        read = arms.from_urdf(arm.urdf.file, name=arm.name, **where)
+        stated = {name: getattr(arm, name) for name in FACTS if _bytes(arm, [name]) != _bytes(read, [name])}
+        if not _same(arm, read.replace(**stated)):
             return None
     except IkgymError:
         return None
     where["meshes"] = where["meshes"] or None  # keys without a value are left out
     where["packages"] = [_relative(one, folder) for one in where["packages"]] or None
     where["bodyless"] = list(where["bodyless"]) or None
-    return {"name": arm.name, "urdf": _relative(arm.urdf.file, folder), **where}
+    return {"name": arm.name, "urdf": _relative(arm.urdf.file, folder), **where, **stated}
 
 
 def _relative(path: pathlib.Path, folder: pathlib.Path) -> str:
@@ -259,6 +271,6 @@ def _same(one: Arm, other: Arm) -> bool:
     return _bytes(one) == _bytes(other) and _bytes(one.bodies) == _bytes(other.bodies)
 
 
-def _bytes(part: Arm | Bodies) -> list[bytes]:
-    fields = [f.name for f in dataclasses.fields(part) if f.init and f.name not in ("name", "bodies")]
+def _bytes(part: Arm | Bodies, names: Iterable[str] = ()) -> list[bytes]:
+    fields = names or [f.name for f in dataclasses.fields(part) if f.init and f.name not in ("name", "bodies")]
     return [np.asarray(getattr(part, name)).tobytes() for name in fields]

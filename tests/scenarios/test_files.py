@@ -370,3 +370,20 @@ def test_a_scenario_is_added_by_one_file_and_an_arm_by_one_table(tmp_path):
     one, long = (make() for make in catalogue.read(added).values())
     np.testing.assert_array_equal(long.forward([0.0])[1] - one.forward([0.0])[1], [2, 0, 0])
     assert (long.name, long.joints) == ("long", 1)
+
+
+def test_an_arm_keeps_its_urdf_file_where_only_limits_change(tmp_path, caplog):
+    """Acceleration limits, which no URDF states, made the viewer lose the meshes."""
+    (tmp_path / "two.urdf").write_text(PAIR)
+    text = 'name = "s"\ntask = "pose"\ndt = 0.01\nsteps = 5\nvelocity_limit = 3.0\n[trajectory]\nkind = "sinusoid"\n'
+    text += 'amplitude = [0.1, 0.2]\n[arm]\nurdf = "two.urdf"\nacceleration_limit = [5.0, 6.0]\n'
+    (tmp_path / "s.toml").write_text(text)
+    scenario = load(tmp_path / "s.toml")
+    assert scenario.arm.urdf.file == (tmp_path / "two.urdf").resolve()
+    scenario.save(tmp_path / "copy.toml")
+    again = load(tmp_path / "copy.toml").arm
+    assert tomllib.loads((tmp_path / "copy.toml").read_text())["arm"]["urdf"] == "two.urdf"
+    assert (again.urdf.file, again.acceleration_limit.tolist()) == (scenario.arm.urdf.file, [5.0, 6.0])
+    (tmp_path / "s.toml").write_text(text + "axes = [[0, 0, 1], [0, 1, 0]]\n")
+    assert load(tmp_path / "s.toml").arm.urdf is None
+    assert "axes: the arm differs from its file" in caplog.text
