@@ -22,13 +22,15 @@ import tyro
 import ikgym
 from baselines import registry
 from baselines.agents.files import AgentFile, save_agent
+from baselines.canonical import canonical, jsonable
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots.comparison import front
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import LOWEST
 from baselines.evaluation.table import records
-from docs import compare, contexts, loop, obstructed, retimed
+from baselines.spec import parse_policy
+from docs import compare, contexts, loop, obstructed, retimed, rivals, tuned
 from docs.keeping import RUNS, WORK, Line, keep, lines, resumable
 
 #: Agents as they are before their training, and their training seeds.
@@ -52,7 +54,7 @@ class Command:
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda,
-    bodies, plants, contexts, compare, loop, retimed and obstructed."""
+    bodies, plants, contexts, compare, loop, retimed, obstructed, rivals and tuned."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
 
@@ -84,7 +86,9 @@ def _group(name: str, old: list[Line], only_new: bool) -> list[Line]:
         played = [policy for line in some for policy in policies(line)]
         rows = evaluate(scenario, played, episodes=episodes, **resumable(f"{name}-{old[0]['scenario']}-{episodes}"))
         before = {line["policy"]: line for line in some}  # with columns that say which policy this is
-        found += [before[one["policy"]] | one | _error(one, rows) for one in records(ranking(rows, list(before)))]
+        found += [
+            before[one["policy"]] | one | _error(scenario, one, rows) for one in records(ranking(rows, list(before)))
+        ]
     best = front(found) if "front" in old[0] else []
     found = [{**line, "front": "yes" if line in best else "no"} for line in found]
     return sorted(found, key=lambda line: float(line["cost_ratio"]))
@@ -102,10 +106,14 @@ def _scenario(line: Line) -> ikgym.Scenario | None:
     return usual.replace(name=line["scenario"], dt=dt, steps=round(usual.steps * usual.dt / dt))
 
 
-def _error(line: Line, rows: Sequence[Row]) -> Line:
-    """The largest position error of a policy with its defaults."""
-    errors = [row.position_error_max for row in rows if row.policy == line["policy"]]
-    return {"error_mm": 1e3 * max(errors) if errors else None}
+def _error(scenario: ikgym.Scenario | None, one: Line, rows: Sequence[Row]) -> Line:
+    """The largest position error of a policy; none of agents and of several seeds."""
+    if scenario is None or len(policies(one)) != 1 or not registry.known(one["policy"].partition(":")[0]):
+        return {"error_mm": None}
+    name, given = parse_policy(one["policy"])
+    parameters = canonical(jsonable(registry.make(name, scenario, **given).parameters))
+    alike = [row for row in rows if row.policy == name and canonical(row.parameters) == parameters]
+    return {"error_mm": 1e3 * max(row.position_error_max for row in alike)}
 
 
 def policies(line: Line) -> list[str]:
@@ -164,6 +172,8 @@ WHOLE: dict[str, Callable[[], list[Line]]] = {
     "loop": loop.measured,
     "obstructed": obstructed.measured,
     "retimed": retimed.measured,
+    "rivals": rivals.measured,
+    "tuned": tuned.measured,
 }
 
 
