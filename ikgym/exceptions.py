@@ -21,6 +21,13 @@ class InvalidInputError(IkgymError, ValueError):
     """A value has a wrong shape, type, range or form."""
 
 
+def printable(text: str, kept: str = "") -> str:
+    """A text as a terminal may show it: control and format characters as escape sequences, except those in `kept`."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
+
+
 def listed(names: Sequence[str]) -> str:
     """Names for a message; of a great many, the first ones."""
     if len(names) <= MANY:

@@ -43,11 +43,16 @@ def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
                 raise InvalidInputError(f"Cannot read {file}: expected a regular file.")
             if about.st_size > most:
                 raise InvalidInputError(f"Cannot read {file}: expected at most {most} bytes, got {about.st_size}.")
-            return stream.read(most)
+            content = stream.read(most + 1)  # files of the system state no size
     except InvalidInputError:
         raise
     except (OSError, TypeError, ValueError) as e:  # such as a path with a null byte
         raise InvalidInputError(f"Cannot read {file}: {getattr(e, 'strerror', None) or e}.") from None
+    if content is None:  # as from a device that waits
+        raise InvalidInputError(f"Cannot read {file}: expected a regular file, got one without content.")
+    if len(content) > most:
+        raise InvalidInputError(f"Cannot read {file}: expected at most {most} bytes, got more.")
+    return content
 
 
 def read_user_toml(file: str | os.PathLike[str]) -> dict[str, Any]:

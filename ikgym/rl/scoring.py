@@ -16,7 +16,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.rl.envs import LearningVectorEnv
 from ikgym.rl.ids import IDS, TaskEnv
 from ikgym.rl.task import Task
-from ikgym.validation import FloatArray, float_array, known_name, known_names, whole_number
+from ikgym.validation import FloatArray, float_array, known_name, known_names, shortened, whole_number
 
 #: Costs of the yardsticks, by split and id; ``python -m benchmarks.yardsticks`` measures them.
 FILE = pathlib.Path(__file__).with_name("yardsticks.json")
@@ -54,12 +54,14 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
 
     Raises:
         UnknownNameError: There is no such environment or split.
+        InvalidInputError: There are not so many episodes, the model has no such `predict`, or its action is refused.
     """
     kind = environment(name)
-    known_name("split", split, scenarios.SPLITS)
-    whole_number("episodes", episodes, at_least=1)
-    total = np.zeros(episodes)
-    steps = list(play(model, kind.task, scenarios.seeds(split, episodes)))
+    seeds = scenarios.seeds(split, whole_number("episodes", episodes, at_least=1))
+    if not callable(getattr(model, "predict", None)):
+        raise InvalidInputError(f"model: expected an object with the method predict, got {shortened(model)}.")
+    total = np.zeros(len(seeds))
+    steps = list(play(model, kind.task, seeds))
     for infos in steps[-(kind.task.counted or 0) :]:
         total += infos["tracking_cost"] + infos["velocity_cost"]
     return total
@@ -71,7 +73,10 @@ def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any
     observation, _ = envs.reset(seed=list(seeds))
     state, begun = None, np.ones(len(seeds), dtype=np.bool_)
     for _ in range(envs.scenario.steps):
-        action, state = model.predict(observation, state=state, episode_start=begun, deterministic=True)
+        answer = model.predict(observation, state=state, episode_start=begun, deterministic=True)
+        if not isinstance(answer, tuple) or len(answer) != 2:
+            raise InvalidInputError(f"model: expected predict to return action and state, got {shortened(answer)}.")
+        action, state = answer
         observation, *_, infos = envs.step(action)
         begun = np.zeros_like(begun)
         yield infos
@@ -90,6 +95,8 @@ def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str
         UnknownNameError: There is no such environment or split.
         InvalidInputError: Costs are not of that shape, not finite or below 0.
     """
+    if not isinstance(results, Mapping):
+        raise InvalidInputError(f"results: expected costs by the id of their environment, got {shortened(results)}.")
     known_names("environment", results, IDS)
     return {name: _score(name, value, yardsticks(split)[name]) for name, value in results.items()}
 

@@ -12,7 +12,10 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import flag, float_array, number, shortened, whole_number
+from ikgym.validation import LARGEST, SMALLEST, flag, float_array, number, shortened, whole_number
+
+#: Most observations that are shown side by side.
+MOST_HISTORY = 1000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Task(Frozen):
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
         ahead: Times ahead at which the reference is shown, in [s], rising; each is at least one step.
         lost_distance: Position error in [m] at which an episode ends; None for never.
-        history: Number of observations shown side by side, at least 1.
+        history: Number of observations shown side by side, from 1 to 1000.
         commands: h, the number of past commands shown.
         share: Share of the largest joint velocities that an action of 1 means, above 0.
         radian: Weight of 1 rad in [m], in observation and reward, above 0.
@@ -80,10 +83,12 @@ class Task(Frozen):
     context: bool = False
 
     def __post_init__(self) -> None:
-        whole_number("history", self.history, at_least=1)
+        whole_number("history", self.history, at_least=1, at_most=MOST_HISTORY)
+        if self.counted is not None:
+            whole_number("counted", self.counted, at_least=1)
         flag("context", self.context)
         for name in ("share", "radian", "zero", "coarse", "fine"):
-            number(name, getattr(self, name), above=0.0)
+            number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)
 
     def arguments(self) -> dict[str, Any]:
         """Arguments of :class:`ikgym.RedundantIKEnv`, single or vector.

@@ -5,6 +5,7 @@ The suite tries a few of each; the environment variable IKGYM_FUZZ says how many
 
 import contextlib
 import functools
+import io
 import os
 import pathlib
 import tempfile
@@ -19,7 +20,8 @@ from baselines.solvers.rivals.model_files import urdf
 from baselines.training.methods import configure
 from baselines.tuning import ranges
 from ikgym import arms, scenarios
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import IkgymError, InvalidInputError
+from ikgym.files import read_user_file
 from ikgym.trajectories import from_csv
 from tests.baselines.random_agents import write_agent
 
@@ -49,6 +51,27 @@ READERS = {
     "it.safetensors": load_agent,
     "results.json": read_rows,
 }
+
+
+@pytest.mark.parametrize("content", [None, b"12345"])
+def test_files_of_the_system_that_state_no_size_are_bounded(content, tmp_path, monkeypatch):
+    (tmp_path / "it").touch()
+    monkeypatch.setattr(os, "fdopen", lambda number, mode: Stream(number, content))
+    with pytest.raises(
+        InvalidInputError, match=r"Cannot read .*it: expected (a regular file, got one|at most 4 bytes)"
+    ):
+        read_user_file(tmp_path / "it", 4)
+
+
+class Stream(io.FileIO):
+    """A stream of a device: its size is 0, its content is another."""
+
+    def __init__(self, number, content):
+        super().__init__(number)
+        self.content = content
+
+    def read(self, most):
+        return self.content
 
 
 @pytest.mark.parametrize("name", [*READERS, "meshes.urdf"])

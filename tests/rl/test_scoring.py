@@ -14,7 +14,7 @@ import ikgym
 from baselines.episodes import Simulation, rollouts
 from benchmarks.yardsticks import Still, counted, returns
 from ikgym import rl, scenarios
-from ikgym.exceptions import IkgymError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.rl.scoring import FILE, interquartile_mean, yardsticks
 
 TRACK = "ikgym/Track-v0"
@@ -40,6 +40,34 @@ def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
     assert found.mean == pytest.approx(0.3)
     assert 0.1 <= found.low < 0.3 < found.high <= 0.9
     assert rl.score({TRACK: costs})[TRACK] == found
+
+
+@pytest.mark.parametrize(
+    "model", [3, None, "dls", SimpleNamespace(predict=1), SimpleNamespace(predict=lambda *_, **__: 0)]
+)
+def test_what_is_no_model_is_refused(model):
+    with pytest.raises(InvalidInputError, match="model: expected"):
+        rl.costs(model, TRACK, episodes=1)
+
+
+@pytest.mark.parametrize("results", [3, None, [[1.0]], "costs", {TRACK: "costs"}, {TRACK: {}}, {TRACK: 1.0}])
+def test_results_of_other_types_are_refused(results):
+    with pytest.raises(InvalidInputError, match="expected"):
+        rl.score(results)
+
+
+@pytest.mark.parametrize("episodes", ["two", 1.5, None, 10**12])
+def test_other_numbers_of_episodes_are_refused(episodes):
+    with pytest.raises(InvalidInputError, match="expected"):
+        rl.costs(SimpleNamespace(predict=None), TRACK, episodes=episodes)
+
+
+@pytest.mark.parametrize("changes", [
+    {"counted": np.nan}, {"counted": 0}, {"radian": 1e300}, {"radian": 1e-300}, {"history": 10**9},
+])  # fmt: skip
+def test_tasks_out_of_range_are_refused(changes):
+    with pytest.raises(InvalidInputError, match=f"{next(iter(changes))}: expected"):
+        rl.make("panda-random", **changes)
 
 
 @pytest.mark.parametrize("name", rl.IDS)
