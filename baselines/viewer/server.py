@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
+import http
 import queue
 import socket
 import time
+import unittest.mock
+import urllib.parse
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import viser
+import websockets.asyncio.server
 from viser.transforms import SO3
 
 from baselines.evaluation.table import escaped
@@ -29,6 +34,8 @@ PATIENCE = 5.0
 SPEEDS = ("0.02", "0.05", "0.1", "0.25", "0.5", "1", "2", "5", "10", "50")
 # Digits behind the point of a slider's value.
 DIGITS = 4
+
+_SERVE = websockets.asyncio.server.serve
 
 LEGEND = (
     "Drag the target, or move a joint; *Play* returns to the episode. A joint is yellow near a limit and red at it. "
@@ -118,7 +125,10 @@ class Viewer:
 @contextlib.contextmanager
 def serving(host: str, port: int) -> Iterator[Any]:
     """A server of viser on a port, 0 for a free one; stopped at the end."""
-    server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
+    # viser has no such option, and calls the function before it returns.
+    same_origin = unittest.mock.patch.object(websockets.asyncio.server, "serve", _serve)
+    with same_origin:
+        server = viser.ViserServer(host, free_port(host, port), label="ikgym view", verbose=False)
     try:
         yield server
     finally:
@@ -132,6 +142,18 @@ def serving(host: str, port: int) -> Iterator[Any]:
                 task.cancel()
             loop.run_until_complete(asyncio.sleep(0.0))
             loop.close()
+
+
+def _serve(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
+    """Serves pages and WebSockets; refuses those that a page of another origin asks for."""
+    return _SERVE(*args, process_request=functools.partial(_process, process_request), **options)
+
+
+def _process(process_request: Callable[..., Any], connection: Any, request: Any) -> Any:
+    hosts = request.headers.get_all("Host")
+    if any(urllib.parse.urlsplit(origin).netloc not in hosts for origin in request.headers.get_all("Origin")):
+        return connection.respond(http.HTTPStatus.FORBIDDEN, "expected a page of the same origin\n")
+    return process_request(connection, request)
 
 
 def free_port(host: str, port: int) -> int:

@@ -16,6 +16,7 @@ from baselines.viewer.session import Mode, Session
 
 pytest.importorskip("viser")
 import msgspec
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from baselines.viewer import server as servers
@@ -42,6 +43,18 @@ class Browser:
 
     def drag(self, target, position):
         self.say("TransformControlsUpdate", name=target.name, wxyz=target.wxyz.tolist(), position=position.tolist())
+
+
+def test_pages_of_other_origins_are_refused(server):
+    port, own = server.get_port(), f"{HOST}:{server.get_port()}"
+
+    for origin in (f"http://{own}", None):
+        with connect(f"ws://{own}", origin=origin):
+            pass
+    for origin in ("http://example.org", f"http://{HOST}:{port + 1}", f"http://{own}.example.org", "null"):
+        with pytest.raises(InvalidStatus, match="403"), connect(f"ws://{own}", origin=origin):
+            pass
+    assert urllib.request.urlopen(f"http://{own}/").status == 200
 
 
 @pytest.fixture
