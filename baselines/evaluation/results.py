@@ -48,6 +48,9 @@ WRITTEN = (
     *("table.csv", "table.md", "cost-time-*.png", "foresight.png", "map.csv", "map.md", "map.png"),
 )
 
+#: Most bytes of a name in a file name, which file systems limit to 255 in all.
+LONGEST = 100
+
 
 class Rows(list[Row]):
     """The rows of an evaluation.
@@ -187,6 +190,8 @@ class Results:
         try:
             for pattern in patterns:
                 for file in self.directory.glob(pattern):
+                    if file.parent.resolve() != self.directory.resolve() / file.parent.relative_to(self.directory):
+                        raise ResultsError(f"--overwrite: {file.parent} is a link to another folder: remove the link.")
                     file.unlink(missing_ok=True)
         except OSError as e:
             raise ResultsError(f"Cannot delete {e.filename}: {e.strerror}.") from None
@@ -215,8 +220,9 @@ def read_rows(file: pathlib.Path) -> list[Row]:
 
 
 def slug(name: str) -> str:
-    """A name as part of a file name."""
-    return re.sub(r"[^\w.=+-]+", "_", name).strip(".") or "_"
+    """A name as part of a file name; where that changes or shortens the name, a digest keeps different names apart."""
+    safe = re.sub(r"[^\w.=+-]+", "_", name).strip(".").encode()[:LONGEST].decode(errors="ignore") or "_"
+    return name if safe == name else f"{safe}-{hashlib.sha256(name.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], machine: Mapping[str, Any]) -> None:

@@ -299,6 +299,25 @@ def test_rows_with_other_keys_are_refused(tmp_path):
     assert len(evaluate("varga7-random", "dls", overwrite=True, **arguments)) == 1
 
 
+def test_names_that_look_alike_or_are_long_have_files_of_their_own(tmp_path):
+    names = ["a/b", "a_b", "a b", "ä" * 300, "ä" * 301]
+    evaluate([FAST.replace(name=name) for name in names], "dls", steps=3, out=tmp_path, export="csv", report=False)
+    assert len(list((tmp_path / "series").glob("*/*.npz"))) == len(list((tmp_path / "export").glob("*/*"))) == 5
+    assert (tmp_path / "series" / "a_b").is_dir()
+
+
+def test_overwrite_follows_no_link_to_another_folder(tmp_path):
+    kept = tmp_path / "elsewhere" / "scenario" / "kept.npz"
+    kept.parent.mkdir(parents=True)
+    kept.touch()
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "series").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
+    with pytest.raises(ResultsError, match=r"series.* is a link to another folder"):
+        evaluate(FAST, "dls", steps=3, out=out, overwrite=True)
+    assert kept.exists()
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("mine")
     interrupted(monkeypatch, 0)
