@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ast
-import csv
+import contextlib
 import dataclasses
 import functools
+import io
+import json
 import math
 import operator
 import pathlib
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,23 +22,28 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise
 
 import ikgym.sb3
-from baselines.files import resumed, write_json
+from baselines.files import csv_text, reading, resumed, write, write_json
 from baselines.training.config import Rewards
 from baselines.training.exporting import ACTIVATIONS, export
 from ikgym import rl
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.files import read_user_file
 from ikgym.sb3 import LearningVecEnv
-from ikgym.validation import FloatArray, known_name, whole_number
+from ikgym.validation import FloatArray, known_name, number, shortened, whole_number
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "recurrent_ppo": RecurrentPPO}
 #: A file an algorithm, with an entry an environment.
 SETTINGS = pathlib.Path(__file__).parent / "settings"
 #: Settings that may change during a training: ``lin_0.001`` falls linearly from there to 0.
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf", "delta_std")
+#: Settings that Stable-Baselines3 takes unchecked: shares, and others above 0.
+SHARES, POSITIVE = ("gamma", "gae_lambda", "tau"), ("learning_rate", "clip_range", "clip_range_vf", "max_grad_norm")
+#: Most bytes of a file of settings, and most values with those of its aliases.
+MOST_BYTES, MOST_VALUES = 2**17, 10_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +66,13 @@ class Training:
         Raises:
             ResultsError: Another run has.
         """
-        return resumed(self.out / "run.json", self._identity(), resume=True, overwrite=False)
+        file = self.out / "run.json"
+        there = resumed(file, self._identity(), resume=True, overwrite=False)
+        if there is not None:
+            with reading(file):
+                for name in ("validation_score", "steps"):
+                    number(name, there.get(name, math.nan))
+        return there
 
     def run(self) -> dict[str, Any]:
         """Trains, and writes `model.zip`, `agent.safetensors`, `curve.csv` and in the end `run.json`.
@@ -76,10 +89,13 @@ class Training:
         about = self._identity()
         settings = about["settings"]
         model = make(self.config, settings, self.seed)
-        self.out.mkdir(parents=True, exist_ok=True)
         curve = Curve(self.config, settings["n_timesteps"], self.out / "curve.csv")
-        model.learn(settings["n_timesteps"], callback=curve)
-        model.save(self.out / "model.zip")
+        model.set_logger(Logger(folder=None, output_formats=[]))  # otherwise it makes a temporary folder
+        with _checks(self.config.method, settings):
+            model.learn(settings["n_timesteps"], callback=curve)
+        file = io.BytesIO()
+        model.save(file)
+        write(self.out / "model.zip", file.getvalue())
         about |= {"steps": model.num_timesteps, "core_seconds": round(curve.spent, 1)}
         about |= {"validation_score": curve.validate()}
         about["agent"] = self._export(model, about)
@@ -89,7 +105,7 @@ class Training:
     def _identity(self) -> dict[str, Any]:
         """All that the result depends on, for `run.json`."""
         config, settings = self.config, read(self.config)
-        settings["n_timesteps"] = int(config.total_timesteps or settings["n_timesteps"])
+        settings["n_timesteps"] = config.total_timesteps or settings["n_timesteps"]
         named = {"env": config.env, "algorithm": config.method, "seed": self.seed}
         return {**named, "settings": settings, "minutes": config.minutes}
 
@@ -114,9 +130,22 @@ def read(config: Rewards) -> dict[str, Any]:
     content = entries(SETTINGS / f"{config.method}.yml" if config.settings is None else config.settings)
     known_name("environment in the settings", config.env, content)
     found = content[config.env]
-    if not isinstance(found, dict) or not isinstance(found.get("n_timesteps"), (int, float)):
-        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {found!r}.")
-    return dict(found)
+    if not isinstance(found, dict) or "n_timesteps" not in found:
+        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {shortened(found)}.")
+    if not _plain(found):  # run.json states them
+        raise InvalidInputError(
+            f"settings: expected texts, finite numbers, lists and tables by text, got {shortened(found)}."
+        )
+    steps = number("n_timesteps", found["n_timesteps"], at_least=1.0)
+    return {**found, "n_timesteps": int(steps)}
+
+
+def _plain(value: object) -> bool:
+    """Whether JSON can state a value."""
+    try:
+        return bool(json.loads(json.dumps(value, allow_nan=False)) == value)
+    except (RecursionError, TypeError, ValueError):
+        return False
 
 
 def entries(file: pathlib.Path) -> dict[str, Any]:
@@ -125,11 +154,28 @@ def entries(file: pathlib.Path) -> dict[str, Any]:
     Raises:
         InvalidInputError: The file cannot be read.
     """
+    text = read_user_file(file, MOST_BYTES)
     try:
-        content = yaml.safe_load(read_user_file(file))
-    except yaml.YAMLError as e:
-        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {e}") from e
+        # Aliases may stand for more values than memory has: they are counted before the values are made.
+        count = _count(yaml.compose(text, yaml.SafeLoader), {})
+        if count <= MOST_VALUES:
+            content = yaml.safe_load(text)
+    except (AttributeError, LookupError, RecursionError, TypeError, ValueError, yaml.YAMLError) as e:
+        reason = shortened(str(e)).strip("'\"")
+        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {reason}") from e
+    if count > MOST_VALUES:
+        raise InvalidInputError(f"settings: expected at most {MOST_VALUES} values with those of aliases, got more.")
     return content if isinstance(content, dict) else {}
+
+
+def _count(node: Any, counts: dict[int, float]) -> float:
+    """The number of values in a node of YAML, each alias counted in full; infinite if a node contains itself."""
+    if id(node) not in counts:
+        counts[id(node)] = math.inf
+        values = node.value if isinstance(node, yaml.CollectionNode) else ()
+        parts = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
+        counts[id(node)] = 1 + sum(_count(part, counts) for part in parts)
+    return counts[id(node)]
 
 
 def make(config: Rewards, settings: Mapping[str, Any], seed: int = 0) -> BaseAlgorithm:
@@ -151,12 +197,23 @@ def built(kind: type[BaseAlgorithm], envs: LearningVecEnv, settings: Mapping[str
     parameters = {key: _value(key, value) for key, value in settings.items() if key not in ("n_timesteps", "n_envs")}
     if parameters.pop("noise_type", None) is not None:
         joints: FloatArray = np.ones(envs.scenario.joints)
-        parameters["action_noise"] = NormalActionNoise(0.0 * joints, parameters.pop("noise_std") * joints)
+        deviation = number("noise_std", parameters.pop("noise_std", None), at_least=0.0)
+        parameters["action_noise"] = NormalActionNoise(0.0 * joints, deviation * joints)
     policy = parameters.pop("policy", next(iter(kind.policy_aliases)))
-    try:
+    with _checks(kind.__name__.lower(), parameters):
         return kind(policy, envs, seed=seed, device="cpu", **parameters)
-    except (AssertionError, TypeError, ValueError) as e:  # Stable-Baselines3's own checks
-        raise InvalidInputError(f"settings: {kind.__name__.lower()} refuses {parameters}: {e}") from e
+
+
+@contextlib.contextmanager
+def _checks(name: str, settings: Mapping[str, Any]) -> Iterator[None]:
+    """Turns errors of a learning library, which checks little before it computes, into one about the settings."""
+    try:
+        yield
+    except (IkgymError, MemoryError, OSError):
+        raise
+    except Exception as e:
+        reason = shortened(str(e) or type(e).__name__, 300).strip("'\"")
+        raise InvalidInputError(f"settings: {name} refuses {shortened(settings, 300)}: {reason}") from e
 
 
 class Curve(BaseCallback):
@@ -187,8 +244,8 @@ class Curve(BaseCallback):
         env, episodes = self._config.env, self._config.episodes
         score = rl.score({env: [rl.costs(self.model, env, episodes=episodes)]}, "validation")[env].mean
         self._rows.append((f"{self.spent:.1f}", str(self.num_timesteps), f"{score:.4f}"))
-        with self._file.open("w", encoding="utf-8", newline="") as stream:
-            csv.writer(stream).writerows(self._rows)
+        head, *rows = self._rows
+        write(self._file, csv_text(head, rows).encode())
         self._since = time.process_time()
         return score
 
@@ -199,15 +256,22 @@ def _value(key: str, value: Any) -> Any:
     Raises:
         InvalidInputError: The text is neither.
     """
+    if key in SHARES:
+        return number(key, value, at_least=0.0, at_most=1.0)
+    if key in POSITIVE and not isinstance(value, str) and value is not None:
+        return number(key, value, above=0.0)
     if not isinstance(value, str):
         return value
     try:
         if key in SCHEDULED:
-            return functools.partial(operator.mul, float(value.split("lin_")[1]))  # of the share that remains
+            start = number(key, float(value.split("lin_")[1]), above=0.0)
+            return functools.partial(operator.mul, start)  # of the share that remains
         if value.startswith("dict("):
             return _literal(ast.parse(value, mode="eval").body)
-    except (IndexError, SyntaxError, ValueError) as e:
-        raise InvalidInputError(f"settings: expected {key} in the format of rl-zoo3, got {value!r}: {e}") from e
+    except (IndexError, MemoryError, RecursionError, SyntaxError, ValueError) as e:  # of text that nests too deeply
+        raise InvalidInputError(
+            f"settings: expected {key} in the format of rl-zoo3, got {shortened(value)}: {shortened(e)}"
+        ) from e
     return value
 
 

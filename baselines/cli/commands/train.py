@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.util
 import inspect
@@ -17,6 +18,7 @@ import tyro
 from baselines.cli import shell
 from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
+from baselines.files import check_writable, locked
 from baselines.training import methods
 from baselines.training.config import APG, Rewards, TrainingError
 from baselines.training.folder import read_run
@@ -127,10 +129,11 @@ def main(arguments: Sequence[str]) -> int:
         nonlocal stopped
         command = parse(arguments)
         _require_extra()
-        if isinstance(command, ByRewards):
-            return _train_by_rewards(command)
-        stopped = f"Stopped. The last checkpoint is in {command.options.out}; continue with --resume."
-        return _train(command, shlex.join([*_program().split(), *arguments]))
+        with shell.escaped_output():
+            if isinstance(command, ByRewards):
+                return _train_by_rewards(command)
+            stopped = f"Stopped. The last checkpoint is in {command.options.out}; continue with --resume."
+            return _train(command, shlex.join([*_program().split(), *arguments]))
 
     return shell.run(work, lambda: stopped)
 
@@ -184,12 +187,17 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
 def _train_by_rewards(command: ByRewards[Any]) -> int:
     from baselines.training.rewards import Training  # imports PyTorch, an extra
 
-    for seed in _checked_seeds(command.seeds):
-        training = Training(command.config, seed, command.out / f"seed-{seed}")
-        there = training.finished()
-        about = there or training.run()
-        done = f"score {about['validation_score']:.3f} after {about['steps']} steps"
-        print(f"seed {seed}: {done}{', already there' if there else ''}", flush=True)
+    seeds = _checked_seeds(command.seeds)
+    trainings = [Training(command.config, seed, command.out / f"seed-{seed}") for seed in seeds]
+    with contextlib.ExitStack() as locks:  # all before the first training, which takes hours
+        for training in trainings:
+            locks.enter_context(locked(training.out))
+            check_writable(training.out)
+        for training in trainings:
+            there = training.finished()
+            about = there or training.run()
+            done = f"score {about['validation_score']:.3f} after {about['steps']} steps"
+            print(f"seed {training.seed}: {done}{', already there' if there else ''}", flush=True)
     print(f"\nwritten to {command.out}")
     return 0
 

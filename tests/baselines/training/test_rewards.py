@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import tempfile
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from stable_baselines3.common.noise import NormalActionNoise
 
 import baselines
 from baselines.cli.commands.train import main
+from baselines.files import locked
 from baselines.training.methods import METHODS
 from baselines.training.rewards import ALGORITHMS, Training, make, read
 from ikgym import rl
@@ -185,8 +187,68 @@ def test_mistakes_are_named(words, message, settings, tmp_path, capsys):
 @pytest.mark.parametrize(("content", "message"), [
     ("[", "expected a YAML file"), ("1", "environment in the settings"), (f"{TRACK}: 3", "expected n_timesteps"),
     (f"{TRACK}: {{gamma: 0.9}}", "expected n_timesteps"),
+    (f"{TRACK}: {{n_timesteps: .inf}}", "expected texts, finite numbers"),
+    (f"{TRACK}: {{n_timesteps: 0}}", "n_timesteps: expected a finite number of at least 1"),
+    (f"{TRACK}: {{n_timesteps: 64, gamma: 2020-01-01}}", "expected texts, finite numbers"),
+    (f"{TRACK}: {{n_timesteps: 64, 1: 2}}", "expected texts, finite numbers"),
+    (f"{TRACK}: !!bool 3", "expected a YAML file"),
+    ("[" * 50_000, "expected a YAML file"),
+    (f"{TRACK}: {'x' * 10_000_000}", "expected at most 131072 bytes"),
+    ("a0: &a0 [x]\n" + "".join(f"a{n + 1}: &a{n + 1} [{', '.join([f'*a{n}'] * 10)}]\n" for n in range(30)),
+     "expected at most 10000 values"),
+    (f"{TRACK}: &a {{n_timesteps: 64, policy_kwargs: *a}}", "expected at most 10000 values"),
 ])  # fmt: skip
 def test_other_files_of_settings_are_refused(content, message, tmp_path):
     (tmp_path / "mine.yml").write_text(content, encoding="utf-8")
     with pytest.raises(IkgymError, match=message):
         read(options("ppo", settings=tmp_path / "mine.yml"))
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+@pytest.mark.parametrize(("setting", "message"), [
+    ("gamma: -1", "gamma: expected a finite number from 0 to 1, got -1.0."),
+    ("clip_range: -1", "clip_range: expected a finite number above 0, got -1.0."),
+    ("clip_range: lin_-1", "clip_range in the format of rl-zoo3"),
+    ("clip_range: [1]", "clip_range: expected a finite number above 0, got [1]."),
+    ("n_epochs: few", "settings: ppo refuses"),  # from within `learn`
+    ("ent_coef: []", "settings: ppo refuses"),
+    ("policy_kwargs: [[[[1]]]]", "settings: ppo refuses"),
+])  # fmt: skip
+def test_errors_of_the_library_are_one_line(setting, message, settings, tmp_path, capsys):
+    key = setting.partition(":")[0]
+    entry = [part for part in settings.read_text(encoding="utf-8").strip().rstrip("}").split(", ") if key not in part]
+    entry = [part for part in entry if not (key == "policy_kwargs" and part.startswith("8]"))]
+    settings.write_text(", ".join([*entry, f"{setting}}}"]), encoding="utf-8")
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--episodes", "2", "--out", str(tmp_path / "runs")]
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_a_folder_that_is_in_use_or_cannot_be_written_is_refused_before_the_training(settings, tmp_path, capsys):
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--seeds", "0", "1", "--out"]
+    with locked(tmp_path / "runs" / "seed-1"):
+        assert main([*words, str(tmp_path / "runs")]) == 2
+    assert "seed-1 is in use: process" in capsys.readouterr().err
+    assert not list((tmp_path / "runs").rglob("*.csv"))
+    (tmp_path / "file").touch()
+    assert main([*words, str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err == f"error: Cannot write into {tmp_path / 'file' / 'seed-0'}: Not a directory.\n"
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_a_run_leaves_no_temporary_folder_and_its_file_is_checked(settings, tmp_path, capsys, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--validations", "1", "--episodes", "2"]
+    words += ["--out", str(tmp_path / "runs")]
+    assert main(words) == 0
+    assert not list((tmp_path / "temporary").iterdir())
+    file = tmp_path / "runs" / "seed-0" / "run.json"
+    about = json.loads(file.read_text(encoding="utf-8"))
+    for damaged in ({**about, "validation_score": "high"}, {**about, "validation_score": None}, {**about, "steps": []}):
+        file.write_text(json.dumps(damaged), encoding="utf-8")
+        assert main(words) == 2
+        assert "run.json is damaged, or was written by another version: " in capsys.readouterr().err
