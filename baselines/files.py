@@ -132,7 +132,7 @@ def reading(file: pathlib.Path, advice: str = "") -> Iterator[None]:
     """
     try:
         yield
-    except ResultsError:
+    except (ResultsError, MemoryError):
         raise
     except OSError as e:
         raise ResultsError(f"Cannot read {file}: {e.strerror or e}.") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import io
 import itertools
 import os
 import pathlib
@@ -12,15 +13,15 @@ import shlex
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Generic, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 import tyro
 
 from baselines.cli.parsing import Rule, parse
 from baselines.workers import MOST
-from ikgym.exceptions import IkgymError, UnknownNameError
+from ikgym.exceptions import IkgymError, UnknownNameError, printable
 from ikgym.validation import FloatArray, whole_number
 
 #: The console command in front of all others.
@@ -50,9 +51,16 @@ def program(name: str, otherwise: str) -> str:
 
 def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped.") -> int:
     """Runs a command; returns its exit code, 2 after an expected error, 130 and the message `stopped` after Ctrl-C."""
+    with _usable_streams():
+        return _exit_code(work, stopped)
+
+
+def _exit_code(work: Callable[[], int], stopped: Callable[[], str]) -> int:
     try:
-        code = work()
-        sys.stdout.flush()
+        try:
+            code = work()
+        finally:
+            sys.stdout.flush()
     except IkgymError as e:
         complain(str(e))
         return 2
@@ -63,15 +71,69 @@ def run(work: Callable[[], int], stopped: Callable[[], str] = lambda: "Stopped."
         complain(f'This needs {package}: pip install "{CONSOLE}[{EXTRAS[package]}]"')
         return 2
     except KeyboardInterrupt:
-        print(f"\n{stopped()}", file=sys.stderr)
+        print(f"\n{printable(stopped())}", file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        # The reader, such as `head`, has closed the pipe. The rest of the buffer goes nowhere: Python would write it at
-        # its end.
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader, such as `head`, has closed the pipe
+        _discard_unwritten()
         return 0
+    except MemoryError as e:
+        complain(f"Out of memory. {e}")
+        return 2
+    except OSError as e:  # such as a full disk; whoever knows more about the file has raised an IkgymError
+        complain(f"{e.filename or 'Output'}: {e.strerror or e}.")
+        _discard_unwritten()
+        return 2
     return code
+
+
+@contextlib.contextmanager
+def _usable_streams() -> Iterator[None]:
+    """Lets output go nowhere where a stream is closed, and escapes characters that its encoding lacks."""
+    with (
+        pathlib.Path(os.devnull).open("w", encoding="utf-8") as nowhere,
+        contextlib.redirect_stdout(sys.stdout or nowhere),
+        contextlib.redirect_stderr(sys.stderr or nowhere),
+    ):
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+        yield
+
+
+def _discard_unwritten() -> None:
+    """Discards what streams cannot write: Python would try again at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+class _Escaped:
+    """A stream that escapes control characters, but not line breaks, tabs and what progress bars move the cursor by."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Writes a text; one that begins with a carriage return is a bar, and a bar has one line."""
+        bar = text.startswith("\r")
+        if not re.fullmatch(r"(?:\x1b\[A)+", text):
+            text = "\r" * bar + printable(text[bar:], "" if bar else "\n\t")
+        self._stream.write(text)
+        return len(text)
+
+
+@contextlib.contextmanager
+def escaped_output() -> Iterator[None]:
+    """Escapes control characters of names and files in all that is printed."""
+    out: Any = _Escaped(sys.stdout)
+    err: Any = _Escaped(sys.stderr)
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        yield
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +171,8 @@ class Command(Generic[P]):
             for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
                 if (value := getattr(options, name, None)) is not None:
                     whole_number(name, value, at_least=1, at_most=most)
-            return self.work(options, shlex.join([*prog.split(), *given])) or 0
+            with escaped_output():
+                return self.work(options, shlex.join([*prog.split(), *given])) or 0
 
         return run(both, lambda: stopped)
 
@@ -121,7 +184,8 @@ def listing(title: str, names: Iterable[str]) -> str:
 
 def complain(message: str) -> None:
     """Prints an error as one line on stderr."""
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    with contextlib.suppress(OSError):
+        print(f"error: {printable(' '.join(message.split()))}", file=sys.stderr)
 
 
 def width() -> int:

@@ -17,6 +17,7 @@ from baselines.evaluation.jobs import Skipped
 from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION
 from baselines.evaluation.table import NOTHING, plain
 from baselines.oracle import best_known
+from ikgym.exceptions import printable
 
 #: Characters that a line of the printed tables may have, and one of a README.
 WIDTH, WIDE = 120, 250
@@ -57,6 +58,7 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
         skipped: Policies that were skipped.
         width: Characters of a line.
     """
+    lines = _printable(lines)
     parts: list[str] = []
     absent: dict[str, None] = {}
     for scenario, here in lines.groupby("scenario", sort=False):
@@ -76,8 +78,9 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
 
 def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
     """The README of a folder of results: tables, parameters and conditions as one block of text in Markdown."""
-    conditions = [f"command: {command}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
+    conditions = [f"command: {printable(command)}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
     text = "\n\n".join([table(lines, skipped, width=WIDE), *map("\n".join, (parameters(lines), conditions))])
+    text = printable(text, "\n")
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return f"# Results\n\n{fence}text\n{text}\n{fence}\n"
 
@@ -92,8 +95,10 @@ def heading(lines: pd.DataFrame) -> str:
 def parameters(lines: pd.DataFrame) -> list[str]:
     """All parameters of each policy in each scenario."""
     return [
-        f"{line.label} in {line.scenario}: "
-        + (", ".join(f"{name}={value}" for name, value in line.parameters.items()) or NOTHING)
+        printable(
+            f"{line.label} in {line.scenario}: "
+            + (", ".join(f"{name}={value}" for name, value in line.parameters.items()) or NOTHING)
+        )
         for line in lines.itertuples()
     ]
 
@@ -129,6 +134,11 @@ def machines(lines: pd.DataFrame) -> list[str]:
     found = list(dict.fromkeys(itertools.chain(*lines.machines)))
     warning = ["The rows were measured on different machines: their times cannot be compared."]
     return [f"machine: {_machine(json.loads(one))}" for one in found] + warning * (len(found) > 1)
+
+
+def _printable(lines: pd.DataFrame) -> pd.DataFrame:
+    """Lines whose names can be printed: a line break in one would begin a line of the table."""
+    return lines.assign(**{key: lines[key].map(printable) for key in ("scenario", "policy", "label")})
 
 
 def _machine(machine: dict[str, Any]) -> str:

@@ -184,6 +184,14 @@ def test_readme():
         assert part in text
 
 
+def test_control_characters_and_line_breaks_of_names_are_escaped(tmp_path):
+    name = "a\x1b[31m\n\u202eb"
+    evaluate(ikgym.scenarios.get("varga7-fast").replace(name=name), "dls", steps=3, out=tmp_path, report=False)
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert text.isprintable() or set(text) & {"\x1b", "\u202e", "\r"} == set()
+    assert r"a\x1b[31m\n\u202eb: 3 steps" in text
+
+
 def test_nothing_in_a_name_is_markup_in_the_readme():
     """Read by a parser of Markdown: a head, and one block of code."""
     markdown_it = pytest.importorskip("markdown_it")
