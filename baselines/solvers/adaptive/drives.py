@@ -1,9 +1,9 @@
-"""Kernels: which delay and lag drives have, from measured joint coordinates and past commands.
+"""Kernels: which delay and lag the drive of each joint has, from measured joint coordinates and past commands.
 
 A drive applies a command d steps late, and its velocity follows that as v(k) = v(k-1) + (u(k) - v(k-1)) / T, where
 T = 1 / (1 - exp(-2π f Δt)) steps belong to a bandwidth of f. Both are linear and do not change, so that their order
 does not matter: a drive with delay is where one without has been d steps ago. So a simulated drive for each of a few
-lags serves all delays, and lags between two of them are mixtures of their motions.
+lags serves all delays. Lags between two of them, and delays between two steps, are mixtures of their motions.
 """
 
 from __future__ import annotations
@@ -22,25 +22,38 @@ HIGH_PASS = 0.98
 #: Standard deviations of the guess, in steps of delay and in steps of lag, in units of the noise of one measurement.
 DELAY_SPREAD, LAG_SPREAD = 4.0, 5.0
 #: By how much the logarithm of the likelihood has to be better before another delay is taken to be right.
-EVIDENCE = 10.0
+EVIDENCE = 5.0
 #: Variance in [rad²] or [m²] that is taken for the noise of q at least.
 LEAST_VARIANCE = 1e-18
+#: By how many steps a delay is changed at a time.
+STRIDES = (4.0, 2.0, 1.0, 0.5, 0.25, 0.0625, 0.015625)
+#: Doubt of a delay, in steps, up to which it is known.
+KNOWN = 1.0
+#: By how many steps the slowest joint may be later than the model is ahead, and earlier.
+LATER, EARLIER = 0.25, 1.25
+# Sums over time: of squares, and of products with the residual of the next lag, of the next delay, and of both, which
+# has two.
+ALONE, NEXT_LAG, NEXT_DELAY, CROSSED = range(4)
+# Doubts: of the delay and the lag together, and of the delay alone.
+TOTAL, DELAY = range(2)
 
 
 class Hypotheses(NamedTuple):
     """Hypotheses about drives.
 
     Attributes:
-        delays: In steps, rising by 1. Shape (D,).
-        lags: T in steps, rising. Shape (L,).
-        delay: The delay that is assumed at first, in steps.
-        lag: The T that is assumed at first, in steps.
+        identify: Whether others than the first ones are taken.
+        longest: The longest delay that is taken, in steps.
+        lags: T in steps, rising. Shape (n, L).
+        delay: The delays that are assumed at first, in steps. Shape (n,).
+        lag: The T that are assumed at first, in steps. Shape (n,).
     """
 
-    delays: IntArray
+    identify: bool
+    longest: int
     lags: FloatArray
-    delay: int
-    lag: float
+    delay: FloatArray
+    lag: FloatArray
 
 
 class PredictedMemory(NamedTuple):
@@ -49,18 +62,20 @@ class PredictedMemory(NamedTuple):
     Attributes:
         begun: Whether there was a step before. Shape (B,).
         measured: Joint coordinates of the step before, in [rad] or [m]. Shape (B, n).
-        velocity: Of the simulated drives, in [rad/s] or [m/s]. Shape (B, L, n).
-        path: Where they are now, and where they were 1, 2, … steps ago, in [rad] or [m]. Shape (B, L, H, n).
-        residual: Difference between the measured joint coordinates and those that a delay and a lag would have led to,
-            without the constant part, in [rad] or [m]. Shape (B, D, L, n).
-        squares: Sums over time of its squares, and of its products with the residual of the next lag. Shape
-            (B, D, L, 2).
-        samples: How many numbers are in a sum. Shape (B,).
-        delay: The delay that is taken to be right, in steps. Shape (B,).
-        lag: The same of T. Shape (B,).
+        velocity: Of the simulated drives, in [rad/s] or [m/s]. Shape (B, n, L).
+        path: Where they are now, and where they were 1, 2, … steps ago, in [rad] or [m]. Shape (B, n, H, L).
+        residual: Difference between the measured joint coordinates and those that a delay of 0, 1, … steps and a lag
+            would have led to, without the constant part, in [rad] or [m]. Shape (B, n, D, L).
+        sums: Sums over time of its squares and products. Shape (B, n, 4, D, L).
+        samples: How many measurements are in a sum. Shape (B,).
+        delay: The delay that is taken to be right, in steps. Shape (B, n).
+        lag: The same of T. Shape (B, n).
+        doubt: By how many steps a hypothesis that is not refuted differs from those two at most: in their sum, and in
+            the delay alone. Shape (B, n, 2).
         sent: The last command in [rad/s] or [m/s]. Shape (B, n).
-        arm_q: Joint coordinates of the arm without delay and lag, in [rad] or [m]. Shape (B, n).
-        arm_qdot: Its joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        lead: How many steps the arm without delay and lag is ahead of the real one. Shape (B,).
+        arm_q: Joint coordinates of that arm, now and 1, 2, … steps ago, in [rad] or [m]. Shape (B, A, n).
+        arm_qdot: Its joint velocities in [rad/s] or [m/s]. Shape (B, A, n).
         offset: Measured task coordinates minus those that the model has at the same time, filtered. Shape (B, m).
         fastest: The largest velocity of that arm in the last second or so, in [rad/s] or [m/s]. Shape (B, n).
     """
@@ -70,53 +85,62 @@ class PredictedMemory(NamedTuple):
     velocity: FloatArray
     path: FloatArray
     residual: FloatArray
-    squares: FloatArray
+    sums: FloatArray
     samples: IntArray
-    delay: IntArray
+    delay: FloatArray
     lag: FloatArray
+    doubt: FloatArray
     sent: FloatArray
+    lead: IntArray
     arm_q: FloatArray
     arm_qdot: FloatArray
     offset: FloatArray
     fastest: FloatArray
 
 
-def start_memory(rows: int, sizes: tuple[int, int], hypotheses: Hypotheses, history: int) -> PredictedMemory:
+def longest_lead(delay: FloatArray) -> int:
+    """How many steps an arm without delay is ahead of one whose joints have such delays, in steps. Shape (n,)."""
+    return max(math.ceil(delay.max() - LATER), 0)
+
+
+def start_memory(rows: int, coordinates: int, hypotheses: Hypotheses, oldest: int) -> PredictedMemory:
     """The memory at the start of an episode.
 
     Args:
         rows: B.
-        sizes: n and m, joints of the arm and task coordinates.
-        hypotheses: Candidates for delay and bandwidth.
-        history: H, steps that the paths of simulated drives reach back.
+        coordinates: m, of the task.
+        hypotheses: Candidates for delay and lag.
+        oldest: The oldest measurements that there may be, in steps.
     """
-    (n, m), delays, lags = sizes, len(hypotheses.delays), len(hypotheses.lags)
+    (n, lags), delays = hypotheses.lags.shape, hypotheses.longest + 2
     return PredictedMemory(
         np.zeros(rows, dtype=np.bool_),
         np.zeros((rows, n)),
-        np.zeros((rows, lags, n)),
-        np.zeros((rows, lags, history, n)),
-        np.zeros((rows, delays, lags, n)),
-        np.zeros((rows, delays, lags, 2)),
+        np.zeros((rows, n, lags)),
+        np.zeros((rows, n, delays + oldest + 1, lags)),
+        np.zeros((rows, n, delays, lags)),
+        np.zeros((rows, n, 4, delays, lags)),
         np.zeros(rows, dtype=np.int64),
-        np.full(rows, hypotheses.delay),
-        np.full(rows, hypotheses.lag),
+        np.tile(hypotheses.delay, (rows, 1)),
+        np.tile(hypotheses.lag, (rows, 1)),
+        np.full((rows, n, 2), np.inf),
         np.zeros((rows, n)),
-        np.zeros((rows, n)),
-        np.zeros((rows, n)),
-        np.zeros((rows, m)),
+        np.full(rows, longest_lead(hypotheses.delay)),
+        np.zeros((rows, delays + 1, n)),
+        np.zeros((rows, delays + 1, n)),
+        np.zeros((rows, coordinates)),
         np.zeros((rows, n)),
     )
 
 
 @kernel
 def identify_rows(q, age, hypotheses, memory):
-    """Takes in a measurement, and which delay and lag it speaks for.
+    """Takes in a measurement, and which delay and lag it speaks for; of one joint in each step.
 
-    The sum of the squared residuals of a mixture of two lags is a parabola in its share, whose coefficients are known:
-    the best lag of each delay is worked out, not searched. While little is known the guess counts as one measurement.
-    Delays differ by more than their neighbours' lags can make up for, and the one in use changes by one step at a time,
-    where the likelihood ratio says so.
+    The sum of the squared residuals of a mixture of two lags and two delays is a parabola in the share of a lag, whose
+    coefficients are known: the best lag of each delay is worked out, not searched. While little is known the guess
+    counts as one measurement: the mean of the joints whose drives are known, if there are any. Delays differ by more
+    than their neighbours' lags can make up for, and the one in use changes where the likelihood ratio says so.
 
     Args:
         q: Measured joint coordinates in [rad] or [m]. Shape (B, n).
@@ -124,107 +148,122 @@ def identify_rows(q, age, hypotheses, memory):
         hypotheses: A plain :class:`Hypotheses`.
         memory: A plain :class:`PredictedMemory`, changed in place.
     """
-    delays, lags, _, _ = hypotheses
-    begun, measured, _, path, residual, squares, samples = memory[:7]
-    best = np.empty((delays.shape[0], 2))
+    begun, measured, _, path, residual, sums, samples = memory[:7]
     for row in range(q.shape[0]):
         if not begun[row]:
             begun[row] = True
-            path[row] = q[row]
-        elif delays.shape[0] * lags.shape[0] > 1:
-            _compare(q[row], measured[row], age[row], delays, path[row], residual[row], squares[row])
-            samples[row] += q.shape[1]
-            _choose(row, hypotheses, squares[row], samples[row], best, memory)
+            for j in range(q.shape[1]):
+                path[row, j] = q[row, j]
+        else:
+            for j in range(q.shape[1]):
+                _compare(q[row, j] - measured[row, j], age[row], path[row, j], residual[row, j], sums[row, j])
+            samples[row] += 1
+            _weigh(row, samples[row] % q.shape[1], hypotheses, memory)
         measured[row] = q[row]
 
 
 @inlined
-def _compare(q, before, age, delays, path, residual, squares):
-    """Brings residuals up to date: shapes (n,), (n,), a number, (D,), (L, H, n), (D, L, n) and (D, L, 2)."""
-    for i in range(delays.shape[0]):
-        late = min(delays[i] + age, path.shape[1] - 2)
-        for f in range(path.shape[0]):
-            alone, both = 0.0, 0.0
-            for j in range(q.shape[0]):
-                moved = (q[j] - before[j]) - (path[f, late, j] - path[f, late + 1, j])
-                residual[i, f, j] = HIGH_PASS * residual[i, f, j] + moved
-                alone += residual[i, f, j] ** 2
-                if f > 0:
-                    both += residual[i, f, j] * residual[i, f - 1, j]
-            squares[i, f, 0] += alone
-            if f > 0:
-                squares[i, f - 1, 1] += both
+def _compare(moved, age, path, residual, sums):
+    """Brings the residuals of a joint up to date: shapes (H, L), (D, L) and (4, D, L)."""
+    delays, lags = residual.shape
+    for i in range(delays):
+        late = min(i + age, path.shape[0] - 2)
+        for f in range(lags):
+            residual[i, f] = HIGH_PASS * residual[i, f] + moved - (path[late, f] - path[late + 1, f])
+    for i in range(delays):
+        for f in range(lags):
+            sums[ALONE, i, f] += residual[i, f] ** 2
+        for f in range(lags - 1):
+            sums[NEXT_LAG, i, f] += residual[i, f] * residual[i, f + 1]
+    for i in range(delays - 1):
+        for f in range(lags):
+            sums[NEXT_DELAY, i, f] += residual[i, f] * residual[i + 1, f]
+        for f in range(lags - 1):
+            sums[CROSSED, i, f] += residual[i, f] * residual[i + 1, f + 1] + residual[i, f + 1] * residual[i + 1, f]
 
 
 @inlined
-def _choose(row, hypotheses, squares, samples, best, memory):
-    """Takes another delay where that is significantly better, and the lag that suits it; ``best`` has shape (D, 2)."""
-    delays, lags, guess, guessed_lag = hypotheses
-    delay, lag = memory[7], memory[8]
-    used = delay[row] - delays[0]
-    low, high, share = mixture(lag[row], lags)
-    alone = squares[used, low, 0], squares[used, low, 1], squares[used, high, 0]
-    variance = max(LEAST_VARIANCE, _mixed(alone, share) / samples)
-    for i in range(delays.shape[0]):
-        best[i, 0], best[i, 1] = _best_lag(squares[i], lags, guessed_lag, variance / LAG_SPREAD**2)
-        best[i, 1] += variance * (1.0 + ((delays[i] - guess) / DELAY_SPREAD) ** 2)
-    chosen = np.argmin(best[:, 1])
-    if 0.5 * samples * math.log(best[used, 1] / best[chosen, 1]) > EVIDENCE:
-        used += 1 if chosen > used else -1
-        delay[row] = delays[used]
-    lag[row] = best[used, 0]
+def _weigh(row, j, hypotheses, memory):
+    """Takes another delay and lag of a joint where they are better, and says which are not refuted."""
+    identify, longest, lags, _, _ = hypotheses
+    sums, samples, delay, lag, doubt = memory[5][row, j], memory[6][row], memory[7], memory[8], memory[9]
+    factor = math.exp(2.0 * EVIDENCE / samples)
+    _, least = _best_lag(sums, delay[row, j], lags[j], 0.0, 0.0)
+    if identify:
+        guess, guessed_lag = _guess(row, j, hypotheses, memory)
+        variance = max(LEAST_VARIANCE, least / samples)
+        found, price = _price(sums, delay[row, j], lags[j], guess, guessed_lag, variance)
+        other, cheaper = _price(sums, guess, lags[j], guess, guessed_lag, variance)
+        if cheaper < price:
+            delay[row, j], found, price = guess, other, cheaper
+        for stride in STRIDES:
+            for sign in (-1.0, 1.0):
+                tried = min(max(delay[row, j] + sign * stride, 0.0), longest)
+                other, cheaper = _price(sums, tried, lags[j], guess, guessed_lag, variance)
+                if factor * cheaper < price:
+                    delay[row, j], found, price = tried, other, cheaper
+        lag[row, j] = found
+    for i in range(sums.shape[1]):
+        for f in range(sums.shape[2]):
+            least = min(least, sums[ALONE, i, f])
+    least = factor * (least + LEAST_VARIANCE * samples) - LEAST_VARIANCE * samples
+    total, alone = 0.0, 0.0
+    for i in range(sums.shape[1]):
+        for f in range(sums.shape[2]):
+            if sums[ALONE, i, f] <= least:
+                total = max(total, abs(i + lags[j, f] - delay[row, j] - lag[row, j]))
+                alone = max(alone, abs(i - delay[row, j]))
+    doubt[row, j, TOTAL], doubt[row, j, DELAY] = total, alone
 
 
 @inlined
-def _mixed(sums, share):
-    """The sum of squares of a mixture, from those of two lags and that of their products."""
-    here, both, there = sums
-    return here - 2.0 * share * (here - both) + share * share * (here - 2.0 * both + there)
+def _guess(row, j, hypotheses, memory):
+    """Delay and lag that a joint probably has: the means of those that are known, or the first guess."""
+    delay, lag, doubt = memory[7], memory[8], memory[9]
+    known, delays, lags = 0, 0.0, 0.0
+    for i in range(delay.shape[1]):
+        if i != j and doubt[row, i, DELAY] <= KNOWN:
+            known, delays, lags = known + 1, delays + delay[row, i], lags + lag[row, i]
+    if known == 0:
+        return hypotheses[3][j], hypotheses[4][j]
+    return delays / known, lags / known
 
 
 @inlined
-def _best_lag(squares, lags, guess, weight):
+def _price(sums, delay, lags, guess, guessed_lag, variance):
+    """The lag that suits a delay best, and its sum of squares; with a weight on the distance from a guess."""
+    lag, price = _best_lag(sums, delay, lags, guessed_lag, variance / LAG_SPREAD**2)
+    return lag, price + variance * (1.0 + ((delay - guess) / DELAY_SPREAD) ** 2)
+
+
+@inlined
+def _best_lag(sums, delay, lags, guess, weight):
     """The lag whose mixture has the least sum of squares, and that sum; with a weight on the distance from a guess."""
-    if lags.shape[0] == 1:
-        return lags[0], squares[0, 0]
-    lag, least = lags[0], np.inf
+    i = min(int(delay), sums.shape[1] - 2)
+    late = delay - i
+    early, crossed = 1.0 - late, late * (1.0 - late)
+    a = lags[0] - guess
+    here = _of_delays(sums, i, 0, early, late) + weight * a * a
+    lag, least = lags[0], here
     for f in range(lags.shape[0] - 1):
-        a, b = lags[f] - guess, lags[f + 1] - guess
-        here, both = squares[f, 0] + weight * a * a, squares[f, 1] + weight * a * b
-        there = squares[f + 1, 0] + weight * b * b
+        b = lags[f + 1] - guess
+        there = _of_delays(sums, i, f + 1, early, late) + weight * b * b
+        both = early * early * sums[NEXT_LAG, i, f] + late * late * sums[NEXT_LAG, i + 1, f]
+        both += crossed * sums[CROSSED, i, f] + weight * a * b
         bend = here - 2.0 * both + there
         share = min(max((here - both) / bend, 0.0), 1.0) if bend > 0.0 else 0.0
-        value = _mixed((here, both, there), share)
+        value = here - 2.0 * share * (here - both) + share * share * bend
         if value < least:
             lag, least = lags[f] + share * (lags[f + 1] - lags[f]), value
+        a, here = b, there
     return lag, max(least, 0.0)
 
 
-@kernel
-def evidence_rows(lags, memory, out):
-    """How much more likely the delays in use are than the next best ones.
-
-    Args:
-        lags: Shape (L,).
-        memory: A plain :class:`PredictedMemory`.
-        out: Receives the logarithm of the likelihood ratio: 0 before the arm has moved, inf where only one delay is
-            considered. Shape (B,).
-    """
-    squares, samples, delay = memory[5], memory[6], memory[7]
-    for row in range(out.shape[0]):
-        least, other, used = LEAST_VARIANCE * samples[row], np.inf, 0.0
-        for i in range(squares.shape[1]):
-            value = _best_lag(squares[row, i], lags, 1.0, 0.0)[1]
-            # One delay for each row of sums, from 0.
-            if i == delay[row]:
-                used = value
-            else:
-                other = min(other, value)
-        out[row] = 0.0
-        if other == np.inf:
-            out[row] = np.inf
-        elif samples[row] > 0:
-            out[row] = 0.5 * samples[row] * math.log((other + least) / (used + least))
+@inlined
+def _of_delays(sums, i, f, early, late):
+    """The sum of squares of a mixture of two delays."""
+    both = 2.0 * early * late * sums[NEXT_DELAY, i, f]
+    return early * early * sums[ALONE, i, f] + both + late * late * sums[ALONE, i + 1, f]
 
 
 @inlined
@@ -239,51 +278,62 @@ def mixture(lag, lags):
     return i, i + 1, min(max((lag - lags[i]) / (lags[i + 1] - lags[i]), 0.0), 1.0)
 
 
+@inlined
+def past(path, lag, lags, steps):
+    """Where a joint was so many steps ago, by a lag; steps may have fractions. Shapes (H, L) and (L,)."""
+    low, high, share = mixture(lag, lags)
+    i = min(int(steps), path.shape[0] - 2)
+    late = min(steps - i, 1.0)
+    now = (1.0 - share) * path[i, low] + share * path[i, high]
+    before = (1.0 - share) * path[i + 1, low] + share * path[i + 1, high]
+    return (1.0 - late) * now + late * before
+
+
 @kernel
-def past_rows(steps, lags, memory, out):
-    """Past joint coordinates of the arms by the current hypothesis.
+def lead_rows(dt, memory):
+    """Keeps the arm without delay and lag as far ahead of the real one as its slowest joint is late.
+
+    One step at a time, by how it moves and moved, not with a jump: so each joint is shown the same as before.
 
     Args:
-        steps: How many steps before today's command takes effect; at most H - 1. Shape (B,).
-        lags: Shape (L,).
-        memory: A plain :class:`PredictedMemory`.
-        out: Receives joint coordinates in [rad] or [m]. Shape (B, n).
+        dt: Δt in [s].
+        memory: A plain :class:`PredictedMemory`, changed in place.
     """
-    path, lag = memory[3], memory[8]
-    for row in range(out.shape[0]):
-        low, high, share = mixture(lag[row], lags)
-        k = min(steps[row], path.shape[2] - 1)
-        for j in range(out.shape[1]):
-            out[row, j] = (1.0 - share) * path[row, low, k, j] + share * path[row, high, k, j]
+    delay, lead, arm_q, arm_qdot = memory[7], memory[11], memory[12], memory[13]
+    last = arm_q.shape[1] - 1
+    for row in range(delay.shape[0]):
+        slowest = np.max(delay[row])
+        if slowest > lead[row] + LATER:
+            lead[row] += 1
+            for i in range(last, 0, -1):
+                arm_q[row, i], arm_qdot[row, i] = arm_q[row, i - 1], arm_qdot[row, i - 1]
+            arm_q[row, 0] += dt * arm_qdot[row, 0]
+        elif slowest < lead[row] - EARLIER:
+            lead[row] -= 1
+            for i in range(last):
+                arm_q[row, i], arm_qdot[row, i] = arm_q[row, i + 1], arm_qdot[row, i + 1]
 
 
 @kernel
-def offset_rows(chain, kind, dt, share, before, batch, lags, memory, off):
+def offset_rows(chain, kind, share, batch, lags, memory, off):
     """How far arms are from where the drives should have brought them, and measured poses from those of the model.
 
     Args:
         chain: The model of the arm.
         kind: The kind of task coordinates.
-        dt: Δt in [s].
         share: Share of a new offset of the pose. Shape (B,).
-        before: The delays that were assumed in the step before. Shape (B,).
         batch: Measured joint coordinates (B, n) and poses (B, m), and how many steps ago that was. Shapes (B,).
-        lags: Shape (L,).
+        lags: Shape (n, L).
         memory: A plain :class:`PredictedMemory`, changed in place.
         off: Receives the difference of the joint coordinates, in [rad] or [m]. Shape (B, n).
     """
     q, pose, q_age, pose_age = batch
-    delay, arm_q, arm_qdot, offset = memory[7], memory[10], memory[11], memory[12]
+    path, delay, lag, offset = memory[3], memory[7], memory[8], memory[14]
     seen, modelled = np.empty_like(q), np.empty_like(pose)
-    past_rows(delay + q_age, lags, memory, off)
-    past_rows(delay + pose_age, lags, memory, seen)
     for row in range(q.shape[0]):
-        # With another delay the arm that is driven belongs to another time: by how it moves, not with a jump.
-        shift = dt * (delay[row] - before[row])
         for j in range(q.shape[1]):
-            arm_q[row, j] += shift * arm_qdot[row, j]
-            off[row, j] = q[row, j] - off[row, j]
-            seen[row, j] += off[row, j]
+            off[row, j] = q[row, j] - past(path[row, j], lag[row, j], lags[j], delay[row, j] + q_age[row])
+            seen[row, j] = past(path[row, j], lag[row, j], lags[j], delay[row, j] + pose_age[row]) + off[row, j]
     pose_rows(chain, kind, seen, modelled)
     for row in range(q.shape[0]):
         for i in range(pose.shape[1]):

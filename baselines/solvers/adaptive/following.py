@@ -7,15 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.adaptive.drives import mixture
+from baselines.solvers.adaptive.drives import TOTAL, mixture
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from ikgym.kernels.jit import kernel
-from ikgym.validation import FloatArray
+from ikgym.kernels.jit import inlined, kernel
+from ikgym.validation import LARGEST, FloatArray
 
 #: Share of the largest acceleration that corrects an error.
 SHARE = 0.2
 #: Commands within this share of the largest velocity are never too fast.
 SLOW = 0.01
+#: Share of the largest stable gain, and steps by which a delay may change that is known.
+STABLE, UNSURE = 0.75, 2.0
 #: For how long the fastest velocity that was wanted is remembered, in [s].
 REMEMBERED = 1.0
 
@@ -24,7 +26,7 @@ class Servo(NamedTuple):
     """Gain and limits of the correction of errors.
 
     Attributes:
-        gain: Share of the present error that is taken back in a step.
+        gain: Share of the present error that is taken back in a step, while nothing is known of the drives.
         dt: Δt in [s].
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
@@ -40,6 +42,16 @@ class Servo(NamedTuple):
     overdrive: float
 
 
+@inlined
+def gain_of(least, doubt):
+    """Share of the present error that is taken back in a step, from the delay that is in doubt, in steps.
+
+    A gain is stable below 2 sin(π / (2 (2 d + 1))) where d steps are not compensated for.
+    """
+    steps = max(doubt, UNSURE)
+    return max(least, STABLE * 2.0 * math.sin(math.pi / (2.0 * (2.0 * steps + 1.0))))
+
+
 @kernel
 def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
@@ -48,48 +60,59 @@ def move_rows(limits, dt, wanted, q, qdot):
         limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
         dt: Δt in [s].
         wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-        q: Joint coordinates in [rad] or [m], changed in place. Shape (B, n).
-        qdot: The velocities applied last, in [rad/s] or [m/s], changed in place. Shape (B, n).
+        q: Joint coordinates now and 1, 2, … steps ago, in [rad] or [m], changed in place. Shape (B, A, n).
+        qdot: The velocities applied last, and those before, in [rad/s] or [m/s], changed in place. Shape (B, A, n).
     """
-    n = q.shape[1]
+    n = q.shape[2]
     lower, upper = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row], qdot[row], lower, upper)
+        velocity_box(limits, dt, q[row, 0], qdot[row, 0], lower, upper)
+        for i in range(q.shape[1] - 1, 0, -1):
+            q[row, i], qdot[row, i] = q[row, i - 1], qdot[row, i - 1]
         for j in range(n):
-            qdot[row, j] = min(max(wanted[row, j], lower[j]), upper[j])
-            q[row, j] += dt * qdot[row, j]
+            qdot[row, 0, j] = min(max(wanted[row, j], lower[j]), upper[j])
+            q[row, 0, j] += dt * qdot[row, 0, j]
 
 
 @kernel
-def follow_rows(error, wanted, lags, servo, memory, qdot):
-    """Commands by which the joints move as wanted, and the velocities that the simulated drives make of them.
+def follow_rows(off, lags, servo, memory, qdot):
+    """Commands by which the joints move as the arm without delay and lag, and what the simulated drives make of them.
 
-    A command is the velocity wanted and a share of the error, through the inverse of the lag. Where accelerations are
-    limited, large errors are taken back no faster than the arm can stop: a share of them would overshoot ever more.
-    A command is at most so many times faster than the wanted velocity of the last second, or slow: the inverse of a lag
-    makes peaks of steps, and a wrong one of errors.
+    A joint that is less late than the slowest one follows where that arm was some steps ago. A command is the velocity
+    wanted and a share of the error, through the inverse of the lag. Where accelerations are limited, large errors are
+    taken back no faster than the arm can stop: a share of them would overshoot ever more. A command is at most so many
+    times faster than the wanted velocity of the last second, or slow: the inverse of a lag makes peaks of steps, and a
+    wrong one of errors.
 
     Args:
-        error: How far the arm will be behind when the command takes effect, in [rad] or [m]. Shape (B, n).
-        wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-        lags: T of the simulated drives. Shape (L,).
+        off: How far the arm is from where the simulated drives should have brought it, in [rad] or [m]. Shape (B, n).
+        lags: T of the simulated drives. Shape (n, L).
         servo: A plain :class:`Servo`.
         memory: A plain :class:`PredictedMemory`, changed in place.
         qdot: Receives the commands in [rad/s] or [m/s]. Shape (B, n).
     """
     gain, dt, unit, largest, change, overdrive = servo
-    velocity, path, lag, sent, fastest = memory[2], memory[3], memory[8], memory[9], memory[13]
+    velocity, path, fastest = memory[2], memory[3], memory[15]
+    delay, lag, doubt, sent, lead, arm_q, arm_qdot = memory[7:14]
     for row in range(qdot.shape[0]):
-        low, high, share = mixture(lag[row], lags)
-        a, b = (1.0 - share) / lags[low], share / lags[high]
         for j in range(qdot.shape[1]):
-            back, stoppable = gain * error[row, j] / dt, SHARE * change[j] / dt * abs(error[row, j])
-            if back * back > stoppable:
-                back = math.copysign(math.sqrt(stoppable), back)
-            target = wanted[row, j] + back
-            free = (1.0 - share - a) * velocity[row, low, j] + (share - b) * velocity[row, high, j]
+            speeds, places = velocity[row, j], path[row, j]
+            low, high, share = mixture(lag[row, j], lags[j])
+            a, b = (1.0 - share) / lags[j, low], share / lags[j, high]
+            held = lead[row] - delay[row, j]
+            i = max(int(held), 0)
+            early = held - i
+            q = (1.0 - early) * arm_q[row, i + 1, j] + early * arm_q[row, i + 2, j]  # before this step, as the drives
+            wanted = (1.0 - early) * arm_qdot[row, i, j] + early * arm_qdot[row, i + 1, j]
+            error = q - (1.0 - share) * places[0, low] - share * places[0, high] - off[row, j]
+            size = abs(error) / dt
+            accelerated = min(change[j], LARGEST) * size  # 0 without an error, also where there is no limit
+            slow = min(gain * size, math.sqrt(SHARE * accelerated))
+            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt((a + b) * accelerated))
+            target = wanted + math.copysign(max(slow, fast), error)
+            free = (1.0 - share - a) * speeds[low] + (share - b) * speeds[high]
             command, last = (target - free) / (a + b), sent[row, j]
-            fastest[row, j] = max((1.0 - dt / REMEMBERED) * fastest[row, j], abs(wanted[row, j]))
+            fastest[row, j] = max((1.0 - dt / REMEMBERED) * fastest[row, j], abs(wanted))
             if overdrive < np.inf:
                 most = max(overdrive * fastest[row, j], SLOW * largest[j])
                 command = min(max(command, -most), most)
@@ -97,9 +120,9 @@ def follow_rows(error, wanted, lags, servo, memory, qdot):
             qdot[row, j] = min(max(command, -largest[j]), largest[j])
             # The command is a float32 share of the unit.
             sent[row, j] = np.float32(qdot[row, j] / unit[j]) * unit[j]
-        for f in range(lags.shape[0]):
-            for i in range(path.shape[2] - 1, 0, -1):
-                path[row, f, i] = path[row, f, i - 1]
-            for j in range(qdot.shape[1]):
-                velocity[row, f, j] += (sent[row, j] - velocity[row, f, j]) / lags[f]
-                path[row, f, 0, j] += dt * velocity[row, f, j]
+            for k in range(places.shape[0] - 1, 0, -1):
+                for f in range(speeds.shape[0]):
+                    places[k, f] = places[k - 1, f]
+            for f in range(speeds.shape[0]):
+                speeds[f] += (sent[row, j] - speeds[f]) / lags[j, f]
+                places[0, f] += dt * speeds[f]

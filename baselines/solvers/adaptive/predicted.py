@@ -13,20 +13,22 @@ import numpy.typing as npt
 from baselines.policy import Batch, Memory, Problem, Solution
 from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.drives import (
+    DELAY,
     Hypotheses,
     PredictedMemory,
-    evidence_rows,
     identify_rows,
+    lead_rows,
+    longest_lead,
     offset_rows,
-    past_rows,
     start_memory,
 )
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
+from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.scenarios.preview import furthest, offsets
-from ikgym.validation import FloatArray, flag, number, whole_number
+from ikgym.validation import FloatArray, flag, number, per_joint, whole_number
 
 #: By how much neighbouring lags differ.
 RATIO = 1.23
@@ -74,8 +76,8 @@ class Predicted(NamedWrapper):
         InvalidInputError: A number is out of its range, or the policy is a reference.
     """
 
-    delay: int = parameter(7, whole_number, at_least=0)
-    bandwidth: float | None = parameter(14.0, number, above=0.0)
+    delay: PerJoint = parameter(7.0, joint_numbers)
+    bandwidth: PerJoint | None = parameter(14.0, joint_numbers)
     identify: bool = parameter(True, flag)
     longest_delay: int = parameter(12, whole_number, at_least=0)
     lowest_bandwidth: float = parameter(8.0, number, above=0.0)
@@ -88,14 +90,18 @@ class Predicted(NamedWrapper):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        lowest = self.lowest_bandwidth
-        if self.identify and self.delay > self.longest_delay:
+        n, lowest = self.problem.model.joints, self.lowest_bandwidth
+        latest = per_joint("delay", self.delay, n).max()
+        if self.identify and latest > self.longest_delay:
             raise InvalidInputError(
-                f"delay: expected a guess of at most longest_delay = {self.longest_delay} steps, got {self.delay}."
+                f"delay: expected a guess of at most longest_delay = {self.longest_delay} steps, got {latest:g}."
             )
-        if self.identify and self.bandwidth is not None and self.bandwidth < lowest:
+        slowest = np.inf if self.bandwidth is None else per_joint("bandwidth", self.bandwidth, n).min()
+        if slowest <= 0.0:
+            raise InvalidInputError(f"bandwidth: expected a number above 0 or one a joint, got {slowest:g}.")
+        if self.identify and slowest < lowest:
             raise InvalidInputError(
-                f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {self.bandwidth:g}."
+                f"bandwidth: expected a guess of at least lowest_bandwidth = {lowest:g} Hz, got {slowest:g}."
             )
 
     def inner_problem(self) -> Problem:
@@ -109,12 +115,12 @@ class Predicted(NamedWrapper):
     @property
     def preview(self) -> int:
         """That of the base policy, and the longest delay on top."""
-        return furthest(self.inner.preview) + int(self._hypotheses.delays[-1])
+        lead = self.longest_delay if self.identify else longest_lead(self._hypotheses.delay)
+        return furthest(self.inner.preview) + lead
 
     def own_memory(self, rows: int) -> PredictedMemory:
         """See :func:`start_memory`."""
-        history = int(self._hypotheses.delays[-1]) + self.oldest + 2
-        return start_memory(rows, (self.problem.model.joints, self.problem.task.size), self._hypotheses, history)
+        return start_memory(rows, self.problem.task.size, self._hypotheses, self.oldest)
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
@@ -123,38 +129,42 @@ class Predicted(NamedWrapper):
         off = self._observe(batch, kept)
         shown = self._shown(batch, kept)
         step = self.ask(shown, self.inner.recall(inside, shown.qdot))
-        behind = kept.arm_q - self._past(np.zeros_like(kept.delay), kept) - off
         qdot = np.empty_like(batch.q)
         limits, servo = self._limits
         move_rows(limits, self.problem.dt, step.qdot, kept.arm_q, kept.arm_qdot)
-        follow_rows(behind, kept.arm_qdot, self._hypotheses.lags, servo, tuple(kept), qdot)
+        follow_rows(off, self._hypotheses.lags, servo, tuple(kept), qdot)
         return self.solution(qdot, kept, step)
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
-        """Those of the base policy; ``delay`` in steps and ``time_constant`` of the lag in [s], as assumed.
+        """Those of the base policy; ``delay`` in steps and ``time_constant`` of the lag in [s], as assumed, by joint.
 
-        ``evidence`` is the logarithm of the likelihood ratio between that delay and the next best one.
+        ``doubt`` says by how many steps delays that are not refuted differ from that one at most; inf before the arm
+        has moved.
         """
         own, _ = self.split(self.memory_of(state))
         with np.errstate(divide="ignore"):  # no lag at T = 1
             constants = -self.problem.dt / np.log1p(-1.0 / own.lag)
-        evidence = np.empty(len(own.lag))
-        evidence_rows(self._hypotheses.lags, tuple(own), evidence)
-        told = {"delay": own.delay.astype(np.float64), "time_constant": constants, "evidence": evidence}
-        return {**super().diagnostics(state), **told}
+        drives = {"delay": own.delay, "time_constant": constants, "doubt": own.doubt[..., DELAY]}
+        return {**super().diagnostics(state), **drives}
 
     @functools.cached_property
     def _hypotheses(self) -> Hypotheses:
-        guess = self._lag(self.bandwidth)
+        n = self.problem.model.joints
+        delay, guess = per_joint("delay", self.delay, n), self._lag(self.bandwidth)
         if not self.identify:
-            return Hypotheses(np.array([self.delay]), np.array([guess]), self.delay, guess)
-        longest = self._lag(self.lowest_bandwidth)
+            longest = max(self.longest_delay, math.ceil(delay.max()))
+            return Hypotheses(False, longest, guess[:, None], delay, guess)
+        longest = self._lag(self.lowest_bandwidth)[0]
         lags = np.geomspace(1.0, longest, 1 + math.ceil(math.log(longest) / math.log(RATIO)))
-        return Hypotheses(np.arange(self.longest_delay + 1), lags, self.delay, guess)
+        return Hypotheses(True, self.longest_delay, np.tile(lags, (n, 1)), delay, guess)
 
-    def _lag(self, bandwidth: float | None) -> float:
-        """T of a bandwidth, in steps."""
-        return 1.0 if bandwidth is None else -1.0 / math.expm1(-2.0 * math.pi * bandwidth * self.problem.dt)
+    def _lag(self, bandwidth: PerJoint | None) -> FloatArray:
+        """T of a bandwidth, in steps. Shape (n,)."""
+        n = self.problem.model.joints
+        if bandwidth is None:
+            return np.ones(n)
+        lag: FloatArray = -1.0 / np.expm1(-2.0 * np.pi * self.problem.dt * per_joint("bandwidth", bandwidth, n))
+        return lag
 
     @functools.cached_property
     def _limits(self) -> tuple[FloatArray, tuple[object, ...]]:
@@ -171,32 +181,27 @@ class Predicted(NamedWrapper):
         share, problem = np.full(len(batch.q), self.gain), self.problem
         if not kept.begun.all():
             fresh = ~kept.begun
-            kept.arm_q[fresh], kept.arm_qdot[fresh], share[fresh] = batch.q[fresh], batch.qdot[fresh], 1.0
+            kept.arm_q[fresh], kept.arm_qdot[fresh, 0], share[fresh] = batch.q[fresh, None], batch.qdot[fresh], 1.0
         q_age, pose_age = _steps(batch.q_age, len(share)), _steps(batch.pose_age, len(share))
-        before, off = kept.delay.copy(), np.empty_like(batch.q)
+        off = np.empty_like(batch.q)
         identify_rows(batch.q, q_age, tuple(self._hypotheses), tuple(kept))
+        if self.identify:
+            lead_rows(problem.dt, tuple(kept))
         seen = batch.q, batch.pose, q_age, pose_age
-        model = problem.model.chain, problem.task.kind, problem.dt
-        offset_rows(*model, share, before, seen, self._hypotheses.lags, tuple(kept), off)
+        offset_rows(problem.model.chain, problem.task.kind, share, seen, self._hypotheses.lags, tuple(kept), off)
         return off
 
     def _shown(self, batch: Batch, kept: PredictedMemory) -> Batch:
         """Observations of the base policy: the arm that it moves, as late as its command will be."""
-        preview, rows, delay = self.inner.preview, len(batch.q), kept.delay
+        preview, rows, lead = self.inner.preview, len(batch.q), kept.lead
+        q, qdot = kept.arm_q[:, 0].copy(), kept.arm_qdot[:, 0].copy()
         if rows == 1 and isinstance(preview, int):
-            nominal = batch.nominal[:, delay[0] : delay[0] + preview]
+            nominal = batch.nominal[:, lead[0] : lead[0] + preview]
         else:
-            nominal = batch.nominal[np.arange(rows)[:, None], delay[:, None] + np.array(offsets(preview)) - 1]
-        remaining = np.maximum(batch.remaining - delay[:, None], 1.0)
-        pose = self.problem.poses(kept.arm_q) + kept.offset
-        parts = kept.arm_q.copy(), kept.arm_qdot.copy(), pose, nominal, remaining
-        return Batch(*parts, obstacles=batch.obstacles)
-
-    def _past(self, steps: npt.NDArray[np.int64], kept: PredictedMemory) -> FloatArray:
-        """Predicted joint coordinates of the arms, see :func:`past_rows`."""
-        out = np.empty_like(kept.sent)
-        past_rows(steps, self._hypotheses.lags, tuple(kept), out)
-        return out
+            nominal = batch.nominal[np.arange(rows)[:, None], lead[:, None] + np.array(offsets(preview)) - 1]
+        remaining = np.maximum(batch.remaining - lead[:, None], 1.0)
+        pose = self.problem.poses(q) + kept.offset
+        return Batch(q, qdot, pose, nominal, remaining, obstacles=batch.obstacles)
 
 
 def _steps(age: FloatArray | None, rows: int) -> npt.NDArray[np.int64]:

@@ -8,7 +8,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from baselines.solvers.adaptive.drives import Hypotheses, identify_rows, start_memory
+from baselines.solvers.adaptive.drives import KNOWN, Hypotheses, identify_rows, start_memory
 
 STEPS, SEED = 400, 1_000_003
 
@@ -54,8 +54,9 @@ def test_unknown_drives_are_identified():
     costs, together, told = driven(scenario, made(), seeds, **drives)
     drawn = [scenario.replace(plant=ikgym.Plant(**drives)).drawn_plant(seed) for seed in seeds]
     assert len({one.command_delay for one in drawn}) > 3
-    np.testing.assert_array_equal(told["delay"], [one.command_delay for one in drawn])
-    constants = 1.0 / (2.0 * np.pi * np.array([one.bandwidth for one in drawn]))
+    delays = np.tile([[one.command_delay] for one in drawn], 7)
+    np.testing.assert_allclose(told["delay"], delays, atol=0.15)
+    constants = 1.0 / (2.0 * np.pi * np.tile([[one.bandwidth] for one in drawn], 7))
     np.testing.assert_allclose(told["time_constant"], constants, rtol=0.03, atol=1e-4)
     ideal, _, _ = driven(scenario, baselines.make("dls", scenario), seeds)
     assert (costs < 2.0 * ideal).all()
@@ -83,7 +84,7 @@ def test_a_wrong_guess_is_stable(ideal):
 def test_old_joint_coordinates_are_taken_for_what_they_are(ideal):
     """The delay is that of the commands, not that of the sensor."""
     costs, _, told = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)
-    assert told["delay"] == 4
+    np.testing.assert_allclose(told["delay"], 4, atol=0.05)
     assert costs < 1.5 * ideal
 
 
@@ -98,12 +99,13 @@ def test_old_poses_are_held_against_the_joint_coordinates_of_their_time(ideal):
 
 
 def test_an_arm_at_rest_says_nothing_of_its_drives():
-    guess = Hypotheses(np.arange(8), np.array([1.0, 4.0, 8.0]), 5, 6.0)
-    memory, rng = start_memory(1, (2, 3), guess, 10), np.random.default_rng(0)
+    guess = Hypotheses(True, 7, np.array([[1.0, 4.0, 8.0]] * 2), np.full(2, 5.0), np.full(2, 6.0))
+    memory, rng = start_memory(1, 3, guess, 0), np.random.default_rng(0)
     for _ in range(500):
         identify_rows(1e-3 * rng.standard_normal((1, 2)), np.zeros(1, dtype=np.int64), tuple(guess), tuple(memory))
-    assert memory.delay[0] == 5
-    assert memory.lag[0] == pytest.approx(6.0)
+    np.testing.assert_array_equal(memory.delay, 5.0)
+    np.testing.assert_allclose(memory.lag, 6.0)
+    assert (memory.doubt > KNOWN).all()
 
 
 def test_preview_is_that_of_the_base_policy_and_the_longest_delay():
