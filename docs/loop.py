@@ -8,6 +8,7 @@ perfect drives.
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -45,20 +46,47 @@ def circle(arm: ikgym.Arm, start: npt.ArrayLike, period: float, seconds: float =
     return ikgym.Scenario("loop", arm, ikgym.tasks.get("pose"), trajectory, **fields)
 
 
-def with_drives(scenario: ikgym.Scenario, drives: Drives) -> ikgym.Scenario:
-    """The same on drives with a delay and a lag."""
-    bandwidth = np.inf if drives.bandwidth is None else drives.bandwidth
-    return scenario.replace(plant=ikgym.Plant(command_delay=drives.delay, bandwidth=bandwidth))
+class DrivenArm:
+    """Joints whose velocities follow commands with a delay and a lag of first order, in continuous time.
+
+    Args:
+        drives: Their delays and lags.
+        q: Where they stand at first, in [rad] or [m]. Shape (n,).
+        period: Δt in [s].
+    """
+
+    def __init__(self, drives: Drives, q: npt.ArrayLike, period: float) -> None:
+        self.q: Any = np.array(q, dtype=np.float64)
+        n, self._period = len(self.q), period
+        self._delay = np.broadcast_to(drives.delay, n)
+        self._constant = np.maximum(np.broadcast_to(drives.time_constant or 0.0, n), 1e-12)
+        self._qdot = np.zeros(n)
+        self._commands = np.zeros((math.ceil(self._delay.max()) + 2, n))
+
+    def move(self, qdot: npt.ArrayLike) -> None:
+        """Moves the joints for a period, in which a command arrives; in [rad/s] or [m/s]. Shape (n,)."""
+        self._commands = np.concatenate([[qdot], self._commands[:-1]])
+        steps, joints = self._delay.astype(int), np.arange(len(self.q))
+        first = (self._delay - steps) * self._period
+        self._follow(self._commands[steps + 1, joints], first)
+        self._follow(self._commands[steps, joints], self._period - first)
+
+    def _follow(self, command: Any, time: Any) -> None:
+        """Follows commands for some time in [s]. Shapes (n,)."""
+        gap, left = self._qdot - command, np.exp(-time / self._constant)
+        self.q += time * command + self._constant * (1.0 - left) * gap
+        self._qdot = command + left * gap
 
 
-def played(controller: Controller, scenario: ikgym.Scenario) -> tuple[Any, Any]:
-    """Position errors in [m], and commands in [rad/s]. Shapes (k,) and (k, n)."""
-    env: Any = ikgym.RedundantIKEnv(scenario, preview=controller.ahead)
-    (seen, _), errors, commands = env.reset(seed=0), [], []
-    for _ in range(scenario.steps):
-        commands.append(controller.step(seen["q"], seen["pose"], seen["nominal"]))
-        seen, *_, info = env.step((commands[-1] / scenario.velocity_limit).astype(np.float32))
-        errors.append(info["position_error"])
+def played(controller: Controller, scenario: ikgym.Scenario, drives: Drives) -> tuple[Any, Any]:
+    """Position errors in [m] and commands in [rad/s] on such drives. Shapes (k,), (k, n)."""
+    ahead, arm = controller.ahead, DrivenArm(drives, scenario.start_of(), scenario.dt)
+    nominal, errors, commands = scenario.nominal(0, ahead), [], []
+    for k in range(scenario.steps):
+        commands.append(controller.step(arm.q, None, nominal[k + 1 : k + 1 + ahead]))
+        arm.move(commands[-1])
+        pose = scenario.task.coordinates(*scenario.arm.forward(arm.q))
+        errors.append(np.linalg.norm(pose[-3:] - nominal[k + 1, -3:]))
     return np.array(errors), np.array(commands)
 
 
@@ -73,7 +101,7 @@ def line(policy: str, told: str, period: float, lag: float | None, delay: int) -
     scenario = circle(arm.replace(acceleration_limit=np.full(7, np.inf)), arm.home, period)
     lost = Guards(position_error=None, orientation_error=None)
     known = {"perfect": Drives(), "given": drives, "identify": "identify"}[told]
-    errors, commands = played(Controller(scenario, policy, known, guards=lost), with_drives(scenario, drives))
+    errors, commands = played(Controller(scenario, policy, known, guards=lost), scenario, drives)
     case = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
     times = (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max()
     return case | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}

@@ -12,23 +12,29 @@ import numpy as np
 from baselines import registry
 from baselines.controller.guards import Guards
 from baselines.policy import SolverPolicy
+from baselines.solvers.adaptive.drives import KNOWN
 from baselines.spec import PolicySpec, parse_policy
 from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
+from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.scenarios import Scenario
-from ikgym.validation import LARGEST, FloatArray, number, shortened, whole_number
+from ikgym.validation import LARGEST, FloatArray, per_joint, shortened
 
 #: Drives that are to be identified.
 IDENTIFY = "identify"
-#: Logarithm of the likelihood ratio from which on identified drives are reported.
-EVIDENCE = 10.0
 #: The policy that predicts the drives.
 PREDICTED = "predicted"
-#: The longest delay that is identified, in periods.
-LONGEST = 12
-#: Its settings for a real arm: lags of up to 40 ms, 5 % of the velocity limits for corrections, calm commands.
-SETTINGS: dict[str, Any] = {"longest_delay": LONGEST, "lowest_bandwidth": 4.0, "reserve": 0.05, "overdrive": 1.25}
+#: The longest delay that is identified, in periods, and the longest time constant, in [s].
+LONGEST, SLOWEST = 12, 0.04
+#: Settings of the policy for a real arm: this range (a discretised lag adds up to half a period of delay), 5 % of the
+#: velocity limits for corrections, and calm commands.
+SETTINGS: dict[str, Any] = {
+    "longest_delay": LONGEST + 1,
+    "lowest_bandwidth": 1.0 / (2.0 * math.pi * SLOWEST),
+    "reserve": 0.05,
+    "overdrive": 1.25,
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,31 +42,84 @@ class Drives(Frozen):
     """Delay and lag of an arm's drives; none by default.
 
     Args:
-        delay: Control periods from a command to its effect.
-        time_constant: T of the first-order lag by which the velocity follows the command, in [s]; None for none.
+        delay: Control periods from a command to its effect, fractions included. A number, or one a joint.
+        time_constant: T of the first-order lag by which the velocity follows the command, in [s]; 0 or None for none. A
+            number, or one a joint.
 
     Raises:
         InvalidInputError: A number is below 0, or not finite.
     """
 
-    delay: int = 0
-    time_constant: float | None = None
+    delay: PerJoint = 0.0
+    time_constant: PerJoint | None = None
 
     def __post_init__(self) -> None:
-        self._settle(delay=whole_number("delay", self.delay, at_least=0))
+        self._settle(delay=joint_numbers("delay", self.delay))
         if self.time_constant is not None:
-            constant = number("time_constant", self.time_constant, at_least=0.0, at_most=LARGEST)
-            self._settle(time_constant=constant or None)
+            constant = joint_numbers("time_constant", self.time_constant)
+            self._settle(time_constant=constant if np.any(constant) else None)
 
     @property
     def perfect(self) -> bool:
         """Whether the velocity is the command at once."""
-        return self.delay == 0 and self.time_constant is None
+        return not np.any(self.delay) and self.time_constant is None
 
-    @property
-    def bandwidth(self) -> float | None:
-        """The bandwidth 1 / (2π T) of the lag in [Hz]; None where there is none."""
-        return None if self.time_constant is None else 1.0 / (2.0 * math.pi * self.time_constant)
+    def parameters(self, joints: int, dt: float) -> dict[str, Any]:
+        """Parameters of `predicted`, whose lag is discretised; the time by which that comes too early is a delay.
+
+        Args:
+            joints: n.
+            dt: Δt in [s].
+
+        Raises:
+            InvalidInputError: The arm has another number of joints.
+        """
+        delay = per_joint("delay", self.delay, joints)
+        constant = per_joint("time_constant", self.time_constant or 0.0, joints)
+        with np.errstate(divide="ignore"):
+            bandwidth = np.minimum(1.0 / (2.0 * math.pi * constant), LARGEST)
+        later = delay + half_period(constant / dt)
+        return {"delay": tuple(later.tolist()), "bandwidth": tuple(bandwidth.tolist())}
+
+
+@dataclasses.dataclass(frozen=True)
+class IdentifiedDrives(Drives):
+    """Identified drives, joint by joint.
+
+    Args:
+        delay: See :class:`Drives`; the mean of the other joints where a joint has not moved.
+        time_constant: See ``delay``.
+        moved: Whether a joint has moved enough to be identified. n booleans.
+        at_least: Whether delay or time constant are at the end of the identified range: they may be longer. n booleans.
+    """
+
+    moved: tuple[bool, ...] = ()
+    at_least: tuple[bool, ...] = ()
+
+    def __str__(self) -> str:
+        """One line a joint."""
+        lines, n = [], len(self.moved)
+        delay, constant = per_joint("delay", self.delay, n), per_joint("", self.time_constant or 0.0, n)
+        for j in range(n):
+            least = "at least " if self.at_least[j] else ""
+            guessed = "" if self.moved[j] else ", the mean of the others: it has not moved"
+            numbers = f"{delay[j]:.2f} periods of delay, {1e3 * constant[j]:.3g} ms of lag"
+            lines.append(f"joint {j + 1}: {least}{numbers}{guessed}")
+        return "\n".join(lines)
+
+
+def half_period(constant: FloatArray) -> FloatArray:
+    """By how many periods a lag in continuous time is later than a discretised one.
+
+    With dv/dt = (u - v) / T the velocity rises during a period. The discretised v(k) = v(k-1) + (1 - exp(-Δt/T))
+    (u(k) - v(k-1)) jumps at its beginning. The joint is later by T/Δt - 1/(exp(Δt/T) - 1) periods: 0 without a lag,
+    half a period with a long one.
+
+    Args:
+        constant: T/Δt. Shape (n,).
+    """
+    with np.errstate(divide="ignore", over="ignore"):
+        return constant - 1.0 / np.expm1(1.0 / constant)
 
 
 def policy_for(
@@ -92,16 +151,25 @@ def policy_for(
     model = scenario.model.replace(acceleration_limit=guards.acceleration(scenario.model))
     known: dict[str, Any] = {}
     if isinstance(drives, Drives):
-        known = {"delay": drives.delay, "bandwidth": drives.bandwidth, "identify": False}
+        known = {**drives.parameters(model.joints, scenario.dt), "identify": False}
     options = {"policy": name, "options": parameters, "oldest": guards.age, **SETTINGS, **known}
     return registry.make(PREDICTED, scenario.replace(model=model), **options)
 
 
-def identified(diagnostics: Mapping[str, FloatArray]) -> Drives | None:
-    """The drives that a policy has identified; None while there is no evidence, or it identifies none."""
-    if not diagnostics.get("evidence", np.zeros(1))[0] > EVIDENCE:
+def identified(diagnostics: Mapping[str, FloatArray], dt: float) -> IdentifiedDrives | None:
+    """The drives that a policy has identified; None while there is no evidence, or it identifies none.
+
+    Args:
+        diagnostics: Those of the policy.
+        dt: Δt in [s].
+    """
+    moved = diagnostics.get("doubt", np.full((1, 1), np.inf))[0] <= KNOWN
+    if not moved.any():
         return None
-    return Drives(round(float(diagnostics["delay"][0])), float(diagnostics["time_constant"][0]))
+    later, constant = diagnostics["delay"][0], diagnostics["time_constant"][0]
+    delay = np.maximum(later - half_period(constant / dt), 0.0)
+    at_least = (later >= LONGEST + 1) | (constant >= 0.999 * SLOWEST)
+    return IdentifiedDrives(*(tuple(array.tolist()) for array in (delay, constant, moved, at_least)))
 
 
 def _named(policy: PolicySpec | SolverPolicy) -> tuple[str, dict[str, Any]]:

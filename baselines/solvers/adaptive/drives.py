@@ -22,7 +22,7 @@ HIGH_PASS = 0.98
 #: Standard deviations of the guess, in steps of delay and in steps of lag, in units of the noise of one measurement.
 DELAY_SPREAD, LAG_SPREAD = 4.0, 5.0
 #: By how much the logarithm of the likelihood has to be better before another delay is taken to be right.
-EVIDENCE = 5.0
+EVIDENCE = 7.0
 #: Variance in [rad²] or [m²] that is taken for the noise of q at least.
 LEAST_VARIANCE = 1e-18
 #: By how many steps a delay is changed at a time.
@@ -100,7 +100,7 @@ class PredictedMemory(NamedTuple):
 
 def longest_lead(delay: FloatArray) -> int:
     """How many steps an arm without delay is ahead of one whose joints have such delays, in steps. Shape (n,)."""
-    return max(math.ceil(delay.max() - LATER), 0)
+    return max(math.ceil(float(delay.max()) - LATER), 0)
 
 
 def start_memory(rows: int, coordinates: int, hypotheses: Hypotheses, oldest: int) -> PredictedMemory:
@@ -135,7 +135,7 @@ def start_memory(rows: int, coordinates: int, hypotheses: Hypotheses, oldest: in
 
 @kernel
 def identify_rows(q, age, hypotheses, memory):
-    """Takes in a measurement, and which delay and lag it speaks for; of one joint in each step.
+    """Takes in a measurement, and finds delay and lag: of joints in doubt that move, and of the others in turn.
 
     The sum of the squared residuals of a mixture of two lags and two delays is a parabola in the share of a lag, whose
     coefficients are known: the best lag of each delay is worked out, not searched. While little is known the guess
@@ -148,7 +148,7 @@ def identify_rows(q, age, hypotheses, memory):
         hypotheses: A plain :class:`Hypotheses`.
         memory: A plain :class:`PredictedMemory`, changed in place.
     """
-    begun, measured, _, path, residual, sums, samples = memory[:7]
+    begun, measured, _, path, residual, sums, samples, _, _, doubt = memory[:10]
     for row in range(q.shape[0]):
         if not begun[row]:
             begun[row] = True
@@ -158,7 +158,10 @@ def identify_rows(q, age, hypotheses, memory):
             for j in range(q.shape[1]):
                 _compare(q[row, j] - measured[row, j], age[row], path[row, j], residual[row, j], sums[row, j])
             samples[row] += 1
-            _weigh(row, samples[row] % q.shape[1], hypotheses, memory)
+            for j in range(q.shape[1]):
+                moves = path[row, j, 0, 0] != path[row, j, 1, 0]
+                if samples[row] % q.shape[1] == j or (moves and doubt[row, j, DELAY] > KNOWN):
+                    _weigh(row, j, hypotheses, memory)
         measured[row] = q[row]
 
 

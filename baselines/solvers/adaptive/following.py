@@ -108,7 +108,7 @@ def follow_rows(off, lags, servo, memory, qdot):
             size = abs(error) / dt
             accelerated = min(change[j], LARGEST) * size  # 0 without an error, also where there is no limit
             slow = min(gain * size, math.sqrt(SHARE * accelerated))
-            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt((a + b) * accelerated))
+            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt(min(SHARE, a + b) * accelerated))
             target = wanted + math.copysign(max(slow, fast), error)
             free = (1.0 - share - a) * speeds[low] + (share - b) * speeds[high]
             command, last = (target - free) / (a + b), sent[row, j]

@@ -76,8 +76,8 @@ class Predicted(NamedWrapper):
         InvalidInputError: A number is out of its range, or the policy is a reference.
     """
 
-    delay: PerJoint = parameter(7.0, joint_numbers)
-    bandwidth: PerJoint | None = parameter(14.0, joint_numbers)
+    delay: float | tuple[float, ...] = parameter(7.0, joint_numbers)
+    bandwidth: float | tuple[float, ...] | None = parameter(14.0, joint_numbers)
     identify: bool = parameter(True, flag)
     longest_delay: int = parameter(12, whole_number, at_least=0)
     lowest_bandwidth: float = parameter(8.0, number, above=0.0)

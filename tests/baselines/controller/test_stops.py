@@ -72,5 +72,5 @@ def test_the_arm_that_the_policy_moves_in_predicted_is_led_back_too():
     for periods in range(1, 4):
         controller.step(q, None, there)
         own, _ = policy.split(policy.memory_of(controller._state))
-        assert (np.abs(own.arm_qdot[0]) <= periods * change + 1e-12).all()
-        assert own.arm_qdot[0, JOINT] < 0.0
+        assert (np.abs(own.arm_qdot[0, 0]) <= periods * change + 1e-12).all()
+        assert own.arm_qdot[0, 0, JOINT] < 0.0
