@@ -47,8 +47,8 @@ class Controller:
 
     *Drives.* The policy moves a model without delay and lag, and the arm is made to follow it, see ``predicted``.
     Delay and lag of each joint are given, or identified while the arm moves. Until then 6 % of an error is corrected in
-    a period, which is stable up to 25 periods of delay; then up to 46 %, which is stable if a delay changes by two. With
-    perfect drives, ``Drives()``, the policy acts on the measurements themselves.
+    a period, which is stable up to 25 periods of delay; then up to 46 %, which is stable if a delay changes by two.
+    With perfect drives, ``Drives()``, the policy acts on the measurements themselves.
 
     *Limits.* Commands stay within the velocities and accelerations of the model. A joint brakes ahead of its stop, and
     one beyond its stop is led back; the acceleration limit takes precedence over the stop, see

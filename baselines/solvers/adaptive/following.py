@@ -26,7 +26,7 @@ class Servo(NamedTuple):
     """Gain and limits of the correction of errors.
 
     Attributes:
-        gain: Share of the present error that is taken back in a step, while nothing is known of the drives.
+        gain: Share of the present error that is corrected in a step while nothing is known of the drives.
         dt: Δt in [s].
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
@@ -108,7 +108,7 @@ def follow_rows(off, lags, servo, memory, qdot):
             size = abs(error) / dt
             accelerated = min(change[j], LARGEST) * size  # 0 without an error, also where there is no limit
             slow = min(gain * size, math.sqrt(SHARE * accelerated))
-            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt(min(SHARE, a + b) * accelerated))
+            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt(min(SHARE, 0.5 * (a + b)) * accelerated))
             target = wanted + math.copysign(max(slow, fast), error)
             free = (1.0 - share - a) * speeds[low] + (share - b) * speeds[high]
             command, last = (target - free) / (a + b), sent[row, j]

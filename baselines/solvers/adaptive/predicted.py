@@ -48,9 +48,10 @@ class Predicted(NamedWrapper):
     The command is the velocity of that arm through the inverse of the lag, within the limits of velocity and
     acceleration, and a small share of the error that is predicted for the time when it takes effect: where the
     simulated drive will be then, corrected by how far the measured arm is from where the simulated one should be now.
-    With a wrong delay that feedback alone has the delay in its loop, and its gain is low for that.
+    With a wrong delay that feedback alone has the delay in its loop, and its gain is low for that. It rises as evidence
+    rules out other delays and lags, up to what is stable if a delay changes by two steps.
 
-    Unknown drives are identified from measured joint coordinates and the policy's own commands, see
+    Unknown drives are identified joint by joint from measured joint coordinates and the policy's own commands, see
     :mod:`baselines.solvers.adaptive.drives`; ``delay`` and ``bandwidth`` are the guess that holds until there is
     evidence for others. The memory begins anew with each episode.
 
@@ -58,13 +59,13 @@ class Predicted(NamedWrapper):
         problem: The scenario as the policy knows it.
         policy: The name of the base policy.
         options: Its parameters; those left out have its defaults.
-        delay: Delay of commands in steps.
-        bandwidth: f of the lag in [Hz]; None where there is none.
+        delay: Delay of commands in steps, fractions included; one number, or one a joint.
+        bandwidth: f of the lag in [Hz]; one number, or one a joint; None where there is none.
         identify: Whether delay and bandwidth are a guess that is to be improved.
         longest_delay: The longest delay that can be identified, in steps.
         lowest_bandwidth: The lowest bandwidth that can be identified, in [Hz].
-        gain: Share of the predicted error that is taken back in a step. Stable below 2 sin(π / (2 (2 d + 1))) where d
-            steps are not compensated for: at 0.06 up to 25.
+        gain: Smallest share of the predicted error that is corrected in a step. Stable below
+            2 sin(π / (2 (2 d + 1))) where d steps are not compensated for: at 0.06 up to 25.
         oldest: The oldest measurements that there may be, in steps, see ``q_age`` and ``pose_age`` of observations;
             older ones are taken to be of that age.
         reserve: Share of the velocity limits that is left for corrections: the base policy has the rest.
