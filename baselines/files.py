@@ -137,8 +137,14 @@ def reading(file: pathlib.Path, advice: str = "") -> Iterator[None]:
     except OSError as e:
         raise ResultsError(f"Cannot read {file}: {e.strerror or e}.") from None
     except Exception as e:  # a damaged file makes readers raise anything
-        reason = (" ".join(str(e).split()) or type(e).__name__)[:300].removesuffix(".")
-        raise ResultsError(f"{file} is damaged, or was written by another version: {reason}. {advice}".rstrip()) from e
+        raise ResultsError(
+            f"{file} is damaged, or was written by another version: {reason(e)}. {advice}".rstrip()
+        ) from e
+
+
+def reason(error: Exception) -> str:
+    """The message of an error of a library in one line, truncated if it is long; its kind if it has none."""
+    return (" ".join(str(error).split()) or type(error).__name__)[:300].removesuffix(".")
 
 
 def resumed(

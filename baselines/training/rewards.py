@@ -26,7 +26,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise
 
 import ikgym.sb3
-from baselines.files import csv_text, reading, resumed, write, write_json
+from baselines.files import csv_text, reading, reason, resumed, write, write_json
 from baselines.training.config import Rewards
 from baselines.training.exporting import ACTIVATIONS, export
 from ikgym import rl
@@ -40,7 +40,8 @@ ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3
 SETTINGS = pathlib.Path(__file__).parent / "settings"
 #: Settings that may change during a training: ``lin_0.001`` falls linearly from there to 0.
 SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf", "delta_std")
-#: Settings that Stable-Baselines3 takes unchecked: shares, and others above 0.
+#: Settings that Stable-Baselines3 takes unchecked: numbers of something, shares, and others above 0.
+COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
 SHARES, POSITIVE = ("gamma", "gae_lambda", "tau"), ("learning_rate", "clip_range", "clip_range_vf", "max_grad_norm")
 #: Most bytes of a file of settings, and most values with those of its aliases.
 MOST_BYTES, MOST_VALUES = 2**17, 10_000
@@ -161,8 +162,7 @@ def entries(file: pathlib.Path) -> dict[str, Any]:
         if count <= MOST_VALUES:
             content = yaml.safe_load(text)
     except (AttributeError, LookupError, RecursionError, TypeError, ValueError, yaml.YAMLError) as e:
-        reason = shortened(str(e)).strip("'\"")
-        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {reason}") from e
+        raise InvalidInputError(f"settings: expected a YAML file of rl-zoo3, got {file}: {reason(e)}.") from e
     if count > MOST_VALUES:
         raise InvalidInputError(f"settings: expected at most {MOST_VALUES} values with those of aliases, got more.")
     return content if isinstance(content, dict) else {}
@@ -212,8 +212,7 @@ def _checks(name: str, settings: Mapping[str, Any]) -> Iterator[None]:
     except (IkgymError, MemoryError, OSError):
         raise
     except Exception as e:
-        reason = shortened(str(e) or type(e).__name__, 300).strip("'\"")
-        raise InvalidInputError(f"settings: {name} refuses {shortened(settings, 300)}: {reason}") from e
+        raise InvalidInputError(f"settings: {name} refuses {shortened(settings, 300)}: {reason(e)}.") from e
 
 
 class Curve(BaseCallback):
@@ -256,6 +255,8 @@ def _value(key: str, value: Any) -> Any:
     Raises:
         InvalidInputError: The text is neither.
     """
+    if key in COUNTS:
+        return whole_number(key, value, at_least=1)
     if key in SHARES:
         return number(key, value, at_least=0.0, at_most=1.0)
     if key in POSITIVE and not isinstance(value, str) and value is not None:
@@ -270,7 +271,7 @@ def _value(key: str, value: Any) -> Any:
             return _literal(ast.parse(value, mode="eval").body)
     except (IndexError, MemoryError, RecursionError, SyntaxError, ValueError) as e:  # of text that nests too deeply
         raise InvalidInputError(
-            f"settings: expected {key} in the format of rl-zoo3, got {shortened(value)}: {shortened(e)}"
+            f"settings: expected {key} in the format of rl-zoo3, got {shortened(value)}: {reason(e)}."
         ) from e
     return value
 

@@ -210,8 +210,9 @@ def test_other_files_of_settings_are_refused(content, message, tmp_path):
     ("clip_range: -1", "clip_range: expected a finite number above 0, got -1.0."),
     ("clip_range: lin_-1", "clip_range in the format of rl-zoo3"),
     ("clip_range: [1]", "clip_range: expected a finite number above 0, got [1]."),
-    ("n_epochs: few", "settings: ppo refuses"),  # from within `learn`
-    ("ent_coef: []", "settings: ppo refuses"),
+    ("n_epochs: few", "n_epochs: expected a whole number of at least 1, got 'few'."),
+    ("n_steps: 1.5", "n_steps: expected a whole number of at least 1, got 1.5."),
+    ("ent_coef: []", "settings: ppo refuses"),  # from within `learn`
     ("policy_kwargs: [[[[1]]]]", "settings: ppo refuses"),
 ])  # fmt: skip
 def test_errors_of_the_library_are_one_line(setting, message, settings, tmp_path, capsys):
