@@ -204,6 +204,23 @@ def check_writable(folder: pathlib.Path) -> None:
         raise ResultsError(f"Cannot write into {folder}: {e.strerror or e}.") from None
 
 
+def check_writable_file(file: pathlib.Path) -> None:
+    """Checks that a file can be written, with its folder, see :func:`check_writable`; its content stays.
+
+    Raises:
+        ResultsError: It cannot: its name is too long, or it is a folder.
+    """
+    check_writable(file.absolute().parent)
+    if file.is_dir():
+        raise ResultsError(f"Cannot write {file}: it is a folder.")
+    try:
+        files.draft_of(file).lstat()
+    except FileNotFoundError:
+        pass
+    except OSError as e:
+        raise ResultsError(f"Cannot write {file}: {e.strerror or e}.") from None
+
+
 @contextlib.contextmanager
 def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
     """Locks a folder for this process; the operating system frees the lock of a process that dies.

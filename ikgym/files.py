@@ -19,8 +19,7 @@ _LONG_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*
 
 def write(file: pathlib.Path, content: bytes) -> None:
     """Writes a file atomically, with its folders: readers see the old content or the new one, also after a crash."""
-    # In the same folder, since renaming is atomic only within one file system.
-    draft = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+    draft = draft_of(file)
     file.parent.mkdir(parents=True, exist_ok=True)
     try:
         with draft.open("wb") as stream:
@@ -31,6 +30,11 @@ def write(file: pathlib.Path, content: bytes) -> None:
     except BaseException:
         draft.unlink(missing_ok=True)
         raise
+
+
+def draft_of(file: pathlib.Path) -> pathlib.Path:
+    """The file that :func:`write` renames: in the same folder, as renaming is atomic only within a file system."""
+    return file.with_name(f".{file.name}.{os.getpid()}.tmp")
 
 
 def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:

@@ -12,6 +12,7 @@ import tyro
 
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, describe_bodies, scenario_of
+from baselines.files import check_writable_file
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.motion import OTHERS, PREFERRED
 from baselines.paths.retiming import refusal, retimed
@@ -65,6 +66,8 @@ Examples:
 def _work(options: Options, _: str) -> None:
     if options.retime is not None and options.retime.suffix != ".toml":
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
+    if options.retime is not None:
+        check_writable_file(options.retime)
     reserve = number("--reserve", options.reserve, at_least=0.0, at_most=0.9)
     every = found = survey(_scenario(options), reserve=reserve)
     if options.branch is not None:

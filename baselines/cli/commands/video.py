@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.cli.parsing import EpisodeOptions, if_random
-from baselines.files import ResultsError, check_writable, write
+from baselines.files import ResultsError, check_writable_file, write
 from baselines.viewer.replay import Replay, Stage, play_all
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.rendering import Renderer
@@ -71,7 +71,7 @@ def _work(options: Options, _: str) -> None:
         raise InvalidInputError(
             f"fps, speed: expected at most {MOST_PICTURES} pictures, got fps {fps:g} and speed {options.speed:g}."
         )
-    check_writable(options.out.absolute().parent)
+    check_writable_file(options.out)
     replays = play_all(stage, options.policies(stage.scenario))
     steps = np.append(np.rint(np.arange(0.0, last, between / stage.scenario.dt)), last).astype(np.int64)
     across = min(len(replays), 2)

@@ -95,6 +95,8 @@ def test_a_path_out_of_reach(capsys):
         (["path", "nowhere.toml"], "nowhere.toml"),
         (["path", "panda-fast", "--speed", "0.1"], "--speed has no effect without a CSV file"),
         (["path", "panda-fast", "--retime", "out.csv"], "--retime: expected a file that ends in .toml"),
+        (["path", "panda-random", "--retime", f"{'x' * 250}.toml"], "File name too long"),  # before it is followed
+        (["path", "panda-random", "--retime", str(FOLDER / "ur10.csv" / "x.toml")], "Cannot write into"),
         (["path", "panda-random"], "the same at every reset"),
         (["path", str(FOLDER / "ur10.csv"), "--speed", "0.1"], "--arm: expected the name of an arm or FILE.urdf"),
         (["path", str(FOLDER / "ur10.csv"), "--arm", "panda"], "speed: expected a number, or times of the waypoints"),

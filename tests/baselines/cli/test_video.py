@@ -45,6 +45,7 @@ def test_the_command_writes_a_video(speed, count, tmp_path, capsys):
     ("options", "message"),
     [
         (["--out", "x.gif"], "out: expected a file that ends in .mp4"),
+        (["--out", f"{'x' * 250}.mp4", "--policy", "dlss"], "File name too long"),  # before anything is played
         *((["--width", width], "width: expected") for width in ("476", "481", "3844")),
         (["--fps", "0"], "fps: expected"),
         (["--speed", "-1"], "speed: expected"),
