@@ -119,7 +119,8 @@ def half_period(constant: FloatArray) -> FloatArray:
         constant: T/Δt. Shape (n,).
     """
     with np.errstate(divide="ignore", over="ignore"):
-        return constant - 1.0 / np.expm1(1.0 / constant)
+        periods = constant - 1.0 / np.expm1(1.0 / constant)
+    return np.clip(periods, 0.0, 0.5)  # what rounding leaves of very long lags
 
 
 def policy_for(

@@ -44,7 +44,7 @@ class Servo(NamedTuple):
 
 @inlined
 def gain_of(least, doubt):
-    """Share of the present error that is taken back in a step, from the delay that is in doubt, in steps.
+    """Share of the present error that is corrected in a step, from the delay that is in doubt, in steps.
 
     A gain is stable below 2 sin(π / (2 (2 d + 1))) where d steps are not compensated for.
     """
@@ -80,9 +80,9 @@ def follow_rows(off, lags, servo, memory, qdot):
 
     A joint that is less late than the slowest one follows where that arm was some steps ago. A command is the velocity
     wanted and a share of the error, through the inverse of the lag. Where accelerations are limited, large errors are
-    taken back no faster than the arm can stop: a share of them would overshoot ever more. A command is at most so many
-    times faster than the wanted velocity of the last second, or slow: the inverse of a lag makes peaks of steps, and a
-    wrong one of errors.
+    corrected no faster than the arm can stop, at a raised gain also through its lag: a share of them would overshoot
+    ever more. A command is at most so many times faster than the wanted velocity of the last second, or slow: the
+    inverse of a lag makes peaks of steps, and a wrong one of errors.
 
     Args:
         off: How far the arm is from where the simulated drives should have brought it, in [rad] or [m]. Shape (B, n).
