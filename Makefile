@@ -2,9 +2,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+CORE := $(VENV)/.core
 STAMP := $(VENV)/.installed
-# What tells the story; DEMO=all plays all policies.
-DEMO := moore_penrose truncated_svd dls null_space full_orientation mfac rhc_gradient rhc rhc_foresight follow_nominal
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
+# What the demo plays; Pink and mink come with the packages for development.
+DEMO := qp sns dls null_space mfac rhc_gradient rhc rhc_foresight
+RIVALS = $(foreach name,pink mink,$(if $(wildcard $(VENV)/lib/python*/site-packages/$(name)),$(name)))
 FUZZ := 20000
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 # Each process that tests start would compile hundreds of modules anew.
@@ -17,13 +20,17 @@ help: ## Show this list
 
 setup: $(STAMP) ## Create .venv and install the pinned dependencies
 
-$(STAMP): pyproject.toml constraints.txt
+$(CORE): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	$(PIP) .
 	@touch $@
 
-demo: $(STAMP) ## Evaluate ten policies (DEMO=all: all, also on a Panda) on the default scenario: results/demo/report.html
-	$(BIN)/ikgym evaluate --scenarios varga7-fast $(if $(filter all,$(DEMO)),panda-random) --policies $(DEMO) --out results/demo --overwrite
+$(STAMP): $(CORE)
+	$(PIP) ".[dev]"
+	@touch $@
+
+demo: $(CORE) ## Play eight solvers on a Panda and on the paper's trajectory: tables, and results/demo/report.html
+	$(BIN)/ikgym evaluate --scenarios panda-turn varga7-fast --policies $(DEMO) $(RIVALS) --workers 2 --out results/demo --overwrite
 
 test: $(STAMP) ## Run the tests that are not marked slow
 	$(PYTEST) -m "not slow"
@@ -59,14 +66,14 @@ docs: results/demo/report.html ## Build the documentation as a site in results/s
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo 'results/site/index.html; to search in it: python -m http.server --directory results/site'
 
-results/demo/report.html: | $(STAMP)
+results/demo/report.html: | $(CORE)
 	$(MAKE) --no-print-directory demo
 
 bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
 	$(BIN)/python -m benchmarks
 
 rivals: $(STAMP) ## Install the solvers and environments that bench compares with
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[rivals]"
+	$(PIP) ".[rivals]"
 
 clean: ## Remove .venv, results and caches
 	rm -rf $(VENV) results .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -16,9 +16,17 @@ from unittest import mock
 from baselines import registry
 from docs.terminal import called, terminal, without_spaces
 
-PAGES = (Path(__file__).parent / "tutorial.md", *sorted((Path(__file__).parent / "tutorials").glob("*.md")))
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+PAGES = (README, ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "tutorials").glob("*.md")))
 # A block, with the name of the file that it is; blocks of text are what the block before has printed.
 _BLOCK = re.compile(r"(?:<!-- file: (?P<file>\S+) -->\n)?```(?P<kind>\w*)\n(?P<content>.*?)```\n", re.DOTALL)
+
+
+def parts(page: Path) -> tuple[str, str]:
+    """The text of a page that is run, and the rest: the README is run up to its first heading."""
+    begin, heading, rest = page.read_text(encoding="utf-8").partition("\n## " if page == README else "\0")
+    return begin, heading + rest
 
 
 def played(text: str, folder: Path) -> str:
@@ -66,9 +74,10 @@ def main() -> None:
     """Writes the pages anew, those that are named or all."""
     wanted = sys.argv[1:] or [page.stem for page in PAGES]
     for page in (page for page in PAGES if page.stem in wanted):
+        text, rest = parts(page)
         with tempfile.TemporaryDirectory() as folder:
-            text = played(page.read_text(encoding="utf-8"), Path(folder))
-        page.write_text(text, encoding="utf-8")
+            text = played(text, Path(folder))
+        page.write_text(text + rest, encoding="utf-8")
 
 
 if __name__ == "__main__":
