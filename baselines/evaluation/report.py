@@ -51,7 +51,9 @@ IDEAL_NOTE = (
 
 
 def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = WIDTH) -> str:
-    """The tables of all scenarios as plain text; notes name skipped policies, and columns that do not fit the width.
+    """The tables of all scenarios as plain text, the lowest cost first.
+
+    Notes name skipped policies, and columns that do not fit the width.
 
     Args:
         lines: See :func:`baselines.evaluation.summary.summarise`.
@@ -61,7 +63,8 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
     lines = _printable(lines)
     parts: list[str] = []
     absent: dict[str, None] = {}
-    for scenario, here in lines.groupby("scenario", sort=False):
+    for scenario, every in lines.groupby("scenario", sort=False):
+        here = every.sort_values("total_cost", kind="stable")
         text, left_out = plain(columns(POLICIES, here), here, width)
         absent.update(dict.fromkeys(column.title for column in left_out))
         parts.append(f"{heading(here)}\n{text}")
