@@ -30,7 +30,7 @@ from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import LOWEST
 from baselines.evaluation.table import records
 from baselines.spec import parse_policy
-from docs import compare, contexts, loop, obstructed, retimed, rivals, tuned
+from docs import compare, contexts, drift, loop, obstructed, retimed, rivals, tuned
 from docs.keeping import RUNS, WORK, Line, keep, lines, resumable
 
 #: Agents as they are before their training, and their training seeds.
@@ -54,7 +54,7 @@ class Command:
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda,
-    bodies, plants, contexts, compare, loop, retimed, obstructed, rivals and tuned."""
+    bodies, plants, contexts, compare, drift, loop, retimed, obstructed, rivals and tuned."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
 
@@ -169,6 +169,7 @@ def _adaptive(line: Line) -> Line:
 OWN: dict[str, Callable[..., list[Line]]] = {"contexts": contexts.measured, "plants": plants}
 WHOLE: dict[str, Callable[[], list[Line]]] = {
     "compare": compare.measured,
+    "drift": drift.measured,
     "loop": loop.measured,
     "obstructed": obstructed.measured,
     "retimed": retimed.measured,
