@@ -27,6 +27,7 @@ from types import ModuleType
 from typing import Any
 
 import llvmlite.binding as llvm
+import numba
 from numba import njit, types
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import Dispatcher
@@ -35,6 +36,9 @@ logger = logging.getLogger("ikgym")
 
 # Errors of reading a file that is damaged or of another version.
 UNREADABLE = (EOFError, pickle.UnpicklingError, ValueError, TypeError, AttributeError, ImportError)
+
+# The newest numba that the private parts used here were tested with.
+TESTED = (0, 68)
 
 # LLVM inlines hardly any function of more instructions.
 INLINED_INSTRUCTIONS = 200
@@ -94,7 +98,26 @@ def kept_on_disk() -> bool:
     return not _not_kept
 
 
+def _known(version: str) -> bool:
+    """Whether this module was tested with a version of numba; the log warns of newer ones."""
+    known = tuple(map(int, version.split(".")[:2])) <= TESTED
+    if not known:
+        logger.warning(
+            "numba %s is newer than %d.%d, the newest that was tested: kernels are compiled anew in each process. "
+            'To keep them on disk: pip install "numba<%d.%d".',
+            *(version, *TESTED, TESTED[0], TESTED[1] + 1),
+        )
+    return known
+
+
+_numba_known = _known(numba.__version__)
+
+
 def _cached(function: Any, **options: Any) -> Any:
+    if not _numba_known:
+        # Its own cache would not notice a change of a callee in another file.
+        _not_kept.add(f"{function.__module__}.{function.__qualname__}")
+        return njit(nogil=True)(function)
     options |= {"nogil": True, "no_cfunc_wrapper": True, "pipeline_class": _Compiler}
     try:
         compiled = njit(cache=True, **options)(function)

@@ -199,6 +199,23 @@ def test_a_full_disk_is_said_once_and_hinders_nothing(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+NEWER = "import numba\nnumba.__version__ = '9.0.1'\n"
+
+
+def test_kernels_run_with_a_newer_numba_and_it_is_said(tmp_path):
+    (tmp_path / "small.py").write_text(SMALL)
+    done = python(tmp_path, "-c", NEWER + "from small import doubled, kept_on_disk\nprint(doubled(1.0), kept_on_disk())")
+    assert done.stdout == "2.0 False\n"
+    assert done.stderr.startswith("numba 9.0.1 is newer than 0.68, the newest that was tested: ")
+    assert not list(tmp_path.glob("__pycache__/*.nb?"))
+
+
+@pytest.mark.slow  # all kernels of a solver are compiled
+def test_a_solver_is_the_same_with_a_newer_numba(tmp_path):
+    costs = "import baselines\nprint(baselines.track('varga7-fast', 'dls', steps=20).tracking_cost.tolist())"
+    assert python(tmp_path, "-c", NEWER + costs).stdout == python(tmp_path, "-c", costs).stdout
+
+
 OTHER_TYPES = pickle.dumps(numba.__version__) + b"cno_such_module\nTuple\n."
 
 
