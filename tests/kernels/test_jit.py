@@ -204,7 +204,9 @@ NEWER = "import numba\nnumba.__version__ = '9.0.1'\n"
 
 def test_kernels_run_with_a_newer_numba_and_it_is_said(tmp_path):
     (tmp_path / "small.py").write_text(SMALL)
-    done = python(tmp_path, "-c", NEWER + "from small import doubled, kept_on_disk\nprint(doubled(1.0), kept_on_disk())")
+    done = python(
+        tmp_path, "-c", NEWER + "from small import doubled, kept_on_disk\nprint(doubled(1.0), kept_on_disk())"
+    )
     assert done.stdout == "2.0 False\n"
     assert done.stderr.startswith("numba 9.0.1 is newer than 0.68, the newest that was tested: ")
     assert not list(tmp_path.glob("__pycache__/*.nb?"))
