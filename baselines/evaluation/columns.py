@@ -159,6 +159,6 @@ SPREAD = ("episodes", "mean", "median", "p90", "worst", "worst_seed", "lost")
 BESIDE_IDEAL = ("ideal_cost_ratio", "times_ideal", "times_ideal_low")
 AT_LIMITS = tuple(f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))
 REPORT = (
-    *("cost_ratio", "ratio_low", "ratio_worst", "total_cost", *ERRORS, *AT_LIMITS, *WHERE, *TIMES, "episodes", "lost"),
-    *("followed", "solver_status"),
+    *("cost_ratio", "ratio_low", "ratio_worst", "total_cost", "followed", "lost", "episodes", *TIMES, *ERRORS, *WHERE),
+    *(*AT_LIMITS, "solver_status"),
 )

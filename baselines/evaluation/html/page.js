@@ -14,7 +14,10 @@ const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: [
 const element = (id) => document.getElementById(id);
 const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;"); // Plotly reads HTML
-const label = (entry) => escaped(entry.policy + (entry.reference ? " *" : ""));
+const label = (entry, most = Infinity) => {
+  const text = entry.policy + (entry.reference ? " *" : "");
+  return escaped(text.length > most ? `${text.slice(0, most - 1)}…` : text);
+};
 const shown = (value) => (value === null || Number.isNaN(value) ? "–" : `${Number(value.toPrecision(4))}`);
 const gap = [null, null, null];
 
@@ -275,11 +278,16 @@ async function drawReplay() {
 // The words above each scene.
 function words({ entry }, k, number) {
   const { x, y } = element("replay")._fullLayout[`scene${number ? number + 1 : ""}`].domain;
+  const width = element("replay").clientWidth * (x[1] - x[0]);
   const one = (name, unit) => (array(entry, name) ? `${shown(1e3 * array(entry, name)[k][0])} ${unit}` : "");
   const errors = [one("position_error", "mm"), one("orientation_error", "mrad")].filter(Boolean).join(", ");
   const clearance = collides(entry) ? `, clearance ${one("clearance", "mm")}` : "";
+  const below = `error ${errors}${clearance}`;
+  const longest = Math.max(entry.policy.length + 2, below.length);
   return {
-    text: `<b>${label(entry)}</b><br>error ${errors}${clearance}`, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom", align: "left",
+    text: `<b>${label(entry, Math.floor(width / 6))}</b><br>${below}`,
+    font: { size: Math.min(Math.max((1.6 * width) / longest, 9), 12) }, // plots do not break lines
+    xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom", align: "left",
     showarrow: false, bordercolor: colour(entry), borderpad: 3,
   };
 }

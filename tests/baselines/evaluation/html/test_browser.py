@@ -88,6 +88,27 @@ def test_bodies_and_the_closest_pair_are_in_the_replay(tab, folder):
     assert tab.evaluate(f"{REPLAY}.data[5].visible") in (None, True)
 
 
+def test_the_table_fits_a_laptop(tab):
+    tab.select_option("#scenario", "")
+    tab.set_viewport_size({"width": 1400, "height": 700})
+    width, needed = tab.eval_on_selector(".dt-layout-table", "part => [part.clientWidth, part.scrollWidth]")
+    assert needed <= width
+
+
 def test_it_fits_a_phone(tab):
     tab.set_viewport_size({"width": 390, "height": 700})
     tab.wait_for_function("document.documentElement.scrollWidth <= 390")
+
+
+@pytest.mark.parametrize("longer", ["", ":damping=0.05" * 4])
+def test_the_words_of_the_replay_fit_a_phone(tab, longer):
+    tab.set_viewport_size({"width": 390, "height": 700})
+    tab.wait_for_function(f"{REPLAY}._fullLayout.width <= 390")
+    tab.evaluate(f"for (const {{ entry }} of PLAYER.arms) entry.policy += '{longer}'")
+    tab.evaluate("seek(0.1)")
+    ends = tab.eval_on_selector_all(
+        "#replay .annotation",
+        "words => words.map(one => one.getBoundingClientRect()).map(one => [one.left, one.right])",
+    )
+    assert ends
+    assert all(0 <= left < right <= 390 for left, right in ends)
