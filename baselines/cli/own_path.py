@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pathlib
 from typing import Annotated, Any
@@ -11,7 +12,8 @@ import tyro
 from baselines.cli.parsing import Rule
 from ikgym import arms, scenarios, tasks
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
+from ikgym.arms.urdf import open_meshes
+from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import from_csv
 from ikgym.validation import number, per_joint
@@ -92,6 +94,13 @@ RULES = (
     Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),
     Rule(ROBOT_OPTIONS[:5], lambda given: (given.arm or "").endswith(".urdf"), "without a URDF file"),
 )
+
+
+def look_at(arm: Arm) -> Arm:
+    """The arm with the meshes of its URDF file opened; as it is where the packages for that are not installed."""
+    with contextlib.suppress(MissingDependencyError):
+        return open_meshes(arm)
+    return arm
 
 
 def describe_bodies(arm: Arm) -> str:

@@ -42,12 +42,15 @@ def closest(arm: Arm, q: FloatArray, boxes: FloatArray, checked: BoolArray) -> C
     """The bodies of an arm and their closest pair.
 
     Obstacles, of shape (N or 1, o, 16), are given for each configuration, of shape (N, n), or once for all; `checked`
-    says whether a body may not touch an obstacle, in shape (o, k).
+    says whether a body may not touch an obstacle, in shape (o, k). Distances of an arm of which not all links were
+    looked at are infinite.
     """
     rows, shapes = len(q), arm.bodies.shapes
     distances, pairs, points = np.empty(rows), np.empty((rows, 2), dtype=np.int64), np.empty((rows, 2, 3))
     placed = np.empty((rows, len(arm.bodies), 9))
     closest_rows(arm.chain, shapes, boxes, checked, np.ascontiguousarray(q), distances, pairs, points, placed)
+    if arm.bodies.unseen:
+        distances[:] = np.inf
     return Closest(distances, pairs, points, _capsules(placed, shapes.radii))
 
 

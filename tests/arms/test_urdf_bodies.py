@@ -14,6 +14,8 @@ from ikgym.arms.urdf import bodies as urdf_bodies
 from ikgym.arms.urdf import geometry
 from ikgym.arms.urdf.covering import Capsule, around, around_box, distances
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.obstacles import Box
+from ikgym.obstacles.solids import closest
 from tests.arms.test_urdf import LIMIT
 from tests.arms.test_urdf import joint as bare
 
@@ -248,6 +250,20 @@ def test_shapes_without_extent_are_left_out(write, caplog):
     arm = from_urdf(write(robot({"a": "", "b": inside + shape('<sphere radius="0.2"/>')}, [joint("j", "a", "b")])))
     assert arm.bodies.radii.tolist() == [0.2]
     assert caplog.text.count("is left out") == 3
+
+
+def test_a_visible_link_whose_only_shape_has_no_extent_was_not_looked_at(write):
+    arm = from_urdf(write(robot({"a": "", "b": VISUAL + shape('<sphere radius="0"/>')}, [joint("j", "a", "b")])))
+    assert arm.bodies.unseen == ("'b': it has a visual shape, but no collision shape",)
+
+
+def test_no_distance_is_told_of_an_arm_that_was_not_looked_at(write):
+    """As viewers show it, which draw the bodies that there are."""
+    ball = shape('<sphere radius="0.1"/>')
+    arm = from_urdf(write(robot({"a": "", "b": ball, "c": VISUAL}, [joint("j", "a", "b"), joint("k", "b", "c")])))
+    box = Box("box", [1.0, 0.0, 0.0], [0.1, 0.1, 0.1])
+    around = arm.bodies.surroundings([box])
+    assert closest(arm, np.zeros((1, 2)), around.boxes[None], around.checked).distances.tolist() == [np.inf]
 
 
 def test_many_shapes_that_always_touch_are_found(write):

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.cli import shell
-from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions, describe_bodies
+from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions, describe_bodies, look_at
 from baselines.cli.parsing import Rule
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
-from ikgym.arms.urdf import open_meshes
 from ikgym.scenarios import toml
 
 #: Most tips in a table; names alone of the others.
@@ -105,7 +104,7 @@ def _table(name: str, arm: Arm) -> str:
 
 def _bodies(arm: Arm) -> list[str]:
     """The bodies of an arm, with the meshes of its file, a line for each link; nothing if there are none."""
-    arm = open_meshes(arm)
+    arm = look_at(arm)
     bodies, links = arm.bodies, ("the base", *arm.joint_names)
     told = textwrap.fill(f"Bodies: {describe_bodies(arm)}", shell.width(), break_on_hyphens=False)
     if not len(bodies):

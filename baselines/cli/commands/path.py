@@ -11,7 +11,7 @@ import numpy as np
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.own_path import RULES, OwnPath, describe_bodies, scenario_of
+from baselines.cli.own_path import RULES, OwnPath, describe_bodies, look_at, scenario_of
 from baselines.files import check_writable_file
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.motion import OTHERS, PREFERRED
@@ -20,7 +20,6 @@ from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
 from ikgym import tasks
 from ikgym.arms import Arm
-from ikgym.arms.urdf import open_meshes
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
@@ -99,7 +98,7 @@ def _scenario(options: Options) -> Scenario:
     if options.bodies is not None:
         changes["collisions"] = options.bodies == "on"
     elif options.file.endswith(".csv") and not changes.get("obstacles"):
-        changes["arm"] = arm = open_meshes(scenario.arm)
+        changes["arm"] = arm = look_at(scenario.arm)
         changes["collisions"] = len(arm.bodies) > 0 and not arm.bodies.unseen
     return scenario.replace(**changes) if changes else scenario
 

@@ -60,7 +60,7 @@ def with_bodies(
         read = [(each, read_solid(f"link {link!r}", each, folders)) for each in tree.collisions(link)]
         solids = [(each, solid) for each, solid in read if isinstance(solid, Solid)]
         reasons = [solid for _, solid in read if isinstance(solid, str)]
-        if not read and tree.visible(link):
+        if not solids and not reasons and tree.visible(link):
             reasons = ["it has a visual shape, but no collision shape"]
         if reasons and place.rigid:
             unseen.append(f"{link!r}: {reasons[0]}")

@@ -239,6 +239,14 @@ def test_an_arm_that_cannot_be_looked_at_is_said_not_to_be(capsys):
     assert "NOT LOOKED AT: 'l2': it has no shape; 'l3'" in said
 
 
+def test_without_obstacles_no_package_for_meshes_is_needed(capsys, monkeypatch):
+    arm_file(BALL.format("sphere"), MESH, MESH, MESH)
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    assert main(["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
+    assert "NOT LOOKED AT: 'l2': its mesh" in re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert main(["arms", "own.urdf"]) == 0
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
