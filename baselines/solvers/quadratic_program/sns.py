@@ -11,10 +11,13 @@ import numpy as np
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
-from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, task_motion
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.limits import CHANGE, FASTEST
+from ikgym.kernels.linear_algebra import cholesky
 from ikgym.validation import FloatArray, number, read_only
 
 SATURATED = int(Status.SATURATED)
@@ -93,12 +96,14 @@ class SaturationNumbers(NamedTuple):
     Attributes:
         gain: Share of the present error that is taken back in one step.
         damping: See :class:`SaturationInNullSpace`.
+        braking_share: Share of the acceleration limits that the feedback assumes for braking; 0 without limits.
         reach: Roots of the inverse weights of the joints. Shape (n,).
         limits: See :func:`limits_with_braking`. Shape (5, n).
     """
 
     gain: float
     damping: float
+    braking_share: float
     reach: FloatArray
     limits: FloatArray
 
@@ -107,16 +112,22 @@ class SaturationNumbers(NamedTuple):
 def sns_step(model, numbers, seen, memory, answer):
     """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
-    add_feedback(numbers.gain, error, shift)
+    error *= numbers.gain
     (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, numbers.limits, model.dt
-    reach = numbers.reach
-    lower, upper = np.empty(q.shape[1]), np.empty(q.shape[1])
+    reach, n = numbers.reach, q.shape[1]
+    lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
     for row in range(q.shape[0]):
         velocity_box(limits, dt, q[row], last[row], lower, upper)
         jac = jacobian[row]
         jac *= dt * reach
         lower /= reach
         upper /= reach
+        if numbers.braking_share > 0.0:
+            weight = motion_weight(jac, error[row], numbers.damping, 0.0, equal, limits[FASTEST])
+            curvature(jac, weight, equal, hessian)
+            if cholesky(hessian):
+                error[row] *= feedback_share(hessian, jac, error[row], numbers.braking_share, limits[CHANGE] / reach)
+        shift[row] += error[row]
         iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
         qdot[row] *= reach
         status[row] = SATURATED if scaled else APPLIED
@@ -133,15 +144,16 @@ class SaturationInNullSpace(ResolvedRate):
     the task velocity, and need not find the largest factor, unlike :class:`QuadraticProgram` with `task_scaling`. The
     status is ``saturated`` where the task velocity was scaled down.
 
-    The pseudoinverse is damped, since the arm would stop in every singularity, and the joints are weighted; neither is
-    part of the source. A task that has lost rank in all joints is scaled only where it loses more.
+    The pseudoinverse is damped, since the arm would stop in every singularity, the joints are weighted, and errors are
+    corrected no faster than the joints can brake; none of these is part of the source. A task that has lost rank in all
+    joints is scaled only where it loses more.
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
         gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
         damping: Added to the squared singular values of J W^-½, as a share of the mean of ‖J_j‖² / w_j over the joints
             j. Smaller squares count as lost rank. At least 0; then those below rounding do, and are left out.
-        joint_weights: See :class:`VelocityProgram`.
+        joint_weights, braking_share: See :class:`VelocityProgram`.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -149,6 +161,7 @@ class SaturationInNullSpace(ResolvedRate):
 
     damping: float = parameter(3e-5, number, at_least=0.0)
     joint_weights: float | Sequence[float] | None = None
+    braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
     _reach: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "sns"
@@ -161,4 +174,5 @@ class SaturationInNullSpace(ResolvedRate):
 
     def numbers(self) -> SaturationNumbers:
         """See :meth:`CompiledPolicy.numbers`."""
-        return SaturationNumbers(self.gain, self.damping, self._reach, limits_with_braking(self.problem))
+        share = self.braking_share if np.isfinite(self.problem.model.acceleration_limit).any() else 0.0
+        return SaturationNumbers(self.gain, self.damping, share, self._reach, limits_with_braking(self.problem))

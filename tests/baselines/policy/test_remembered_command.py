@@ -86,11 +86,12 @@ def test_the_remembered_command_is_that_of_an_ideal_plant(name):
         assert identical(last, simulator.step(action).qdot)
 
 
-def test_on_late_drives_the_limits_are_kept_from_the_command():
+@pytest.mark.parametrize("name", ["qp", "sns"])
+def test_on_late_drives_the_limits_are_kept_from_the_command(name):
     """With the observed velocity the error is some millimetres (rms), and grows."""
     plant = ikgym.Plant(command_delay=2, bandwidth=62.9)
     scenario = ikgym.scenarios.get("panda-random").replace(plant=plant, steps=700)
-    episodes = rollouts(scenario, baselines.make("qp", scenario), ikgym.scenarios.seeds("validation", 4))
+    episodes = rollouts(scenario, baselines.make(name, scenario), ikgym.scenarios.seeds("validation", 4))
     assert np.sqrt(np.mean([episode.position_error**2 for episode in episodes])) < 1e-4
 
 
