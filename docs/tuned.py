@@ -1,7 +1,8 @@
 """The table `tuned`: solvers that know bodies, two parameters each, tuned with the same trials on validation scenes.
 
-A scene is the first two seconds of a scenario, its obstacles moved by 8 mm and its path 20 % faster. The cost of a
-trial is the geometric mean of the total costs. The best settings are a line of their own in `bodies`.
+A scene is the first two seconds of a scenario, its obstacles moved by 8 mm and its path 20 % faster, where its bends
+allow that (in `panda-shelf` they do not). The cost of a trial is the geometric mean of the total costs. The best
+settings are a line of their own in `bodies`.
 """
 
 from __future__ import annotations
