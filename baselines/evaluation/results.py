@@ -105,6 +105,10 @@ class Results:
             )
         check_flags(self._file, resume=options.resume, overwrite=options.overwrite)
         check_writable(directory)
+        for folder in (directory / "series", directory / "export"):
+            for one in (folder, *folder.glob("*")):
+                if one.is_symlink():  # files behind it belong to somebody else
+                    raise ResultsError(f"{one} is a link to another folder: remove the link.")
         self._rows = {row.key: row for row in read_rows(self._file)} if options.resume and self._file.exists() else {}
         _check_comparable(self._file, list(self._rows.values()), jobs, machine)
         for file, row in {self.series_file(row): row for row in self._rows.values()}.items():
@@ -190,8 +194,6 @@ class Results:
         try:
             for pattern in patterns:
                 for file in self.directory.glob(pattern):
-                    if file.parent.resolve() != self.directory.resolve() / file.parent.relative_to(self.directory):
-                        raise ResultsError(f"--overwrite: {file.parent} is a link to another folder: remove the link.")
                     file.unlink(missing_ok=True)
         except OSError as e:
             raise ResultsError(f"Cannot delete {e.filename}: {e.strerror}.") from None

@@ -306,16 +306,18 @@ def test_names_that_look_alike_or_are_long_have_files_of_their_own(tmp_path):
     assert (tmp_path / "series" / "a_b").is_dir()
 
 
-def test_overwrite_follows_no_link_to_another_folder(tmp_path):
-    kept = tmp_path / "elsewhere" / "scenario" / "kept.npz"
-    kept.parent.mkdir(parents=True)
-    kept.touch()
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("link", ["series", "export/varga7-fast"])
+def test_no_link_to_another_folder_is_followed(link, overwrite, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
     out = tmp_path / "out"
-    out.mkdir()
-    (out / "series").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
-    with pytest.raises(ResultsError, match=r"series.* is a link to another folder"):
-        evaluate(FAST, "dls", steps=3, out=out, overwrite=True)
-    assert kept.exists()
+    (out / link).parent.mkdir(parents=True)
+    (out / link).symlink_to(tmp_path / "elsewhere", target_is_directory=True)
+    (out / "README.md").touch()
+    with pytest.raises(ResultsError, match=rf"{link} is a link to another folder"):
+        evaluate(FAST, "dls", steps=3, out=out, overwrite=overwrite, export="csv")
+    assert not list((tmp_path / "elsewhere").iterdir())
+    assert (out / "README.md").exists()  # refused before anything is deleted
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path, monkeypatch):
