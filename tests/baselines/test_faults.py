@@ -8,6 +8,7 @@ import baselines
 from baselines.policy.parameters import checks
 from baselines.registry import get
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.plant.checks import joint_numbers
 from ikgym.validation import number, whole_number
 from tests.baselines.making import made, usual
 
@@ -42,6 +43,8 @@ def bad_values(check):
         yield from (check.keywords["at_least"] - 1,) if "at_least" in check.keywords else ()
         yield from (check.keywords["at_most"] + 1,) if "at_most" in check.keywords else ()
         yield from (1.5,) if check.func is whole_number else (np.inf,)
+    elif check.func is joint_numbers:
+        yield from ("x", np.nan, True, -1.0, [[1.0]])
     else:  # one of several words, or a truth value
         yield from ("nothing like it", 1, None)
 

@@ -32,6 +32,8 @@ from ikgym.validation import FloatArray, flag, number, per_joint, whole_number
 
 #: By how much neighbouring lags differ.
 RATIO = 1.23
+#: Longest delay, and oldest measurement, in steps.
+LONGEST = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,12 +64,12 @@ class Predicted(NamedWrapper):
         delay: Delay of commands in steps, fractions included; one number, or one a joint.
         bandwidth: f of the lag in [Hz]; one number, or one a joint; None where there is none.
         identify: Whether delay and bandwidth are a guess that is to be improved.
-        longest_delay: The longest delay that can be identified, in steps.
+        longest_delay: The longest delay that can be identified, in steps. At most 1000.
         lowest_bandwidth: The lowest bandwidth that can be identified, in [Hz].
         gain: Smallest share of the predicted error that is corrected in a step. Stable below
             2 sin(π / (2 (2 d + 1))) where d steps are not compensated for: at 0.06 up to 25.
         oldest: The oldest measurements that there may be, in steps, see ``q_age`` and ``pose_age`` of observations;
-            older ones are taken to be of that age.
+            older ones are taken to be of that age. At most 1000.
         reserve: Share of the velocity limits that is left for corrections: the base policy has the rest.
         overdrive: How many times faster a command may be than the fastest that the base policy wanted within the last
             second; up to 1 % of the limit always. None for any command within the limits.
@@ -80,10 +82,10 @@ class Predicted(NamedWrapper):
     delay: float | tuple[float, ...] = parameter(7.0, joint_numbers)
     bandwidth: float | tuple[float, ...] | None = parameter(14.0, joint_numbers)
     identify: bool = parameter(True, flag)
-    longest_delay: int = parameter(12, whole_number, at_least=0)
+    longest_delay: int = parameter(12, whole_number, at_least=0, at_most=LONGEST)
     lowest_bandwidth: float = parameter(8.0, number, above=0.0)
     gain: float = parameter(0.06, number, above=0.0, at_most=1.0)
-    oldest: int = parameter(0, whole_number, at_least=0)
+    oldest: int = parameter(0, whole_number, at_least=0, at_most=LONGEST)
     reserve: float = parameter(0.0, number, at_least=0.0, below=1.0)
     overdrive: float | None = parameter(None, number, at_least=1.0)
 
