@@ -17,8 +17,8 @@ from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
 from ikgym.machine import check_memory, in_chunks, of_rows
 from ikgym.options import take_actions
-from ikgym.plant import step as plant_step
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
+from ikgym.plant.step import step
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.entering import checked_starts, checked_steps, entered_states
@@ -82,7 +82,6 @@ class Simulator:
             qdot=np.zeros((rows, joints)),
             step=np.zeros(rows, dtype=np.int64),
             frames=self._nominal.allocate(),
-            scratch=np.empty((rows, 12 + coordinates + scenario.task.error_size)),
         )
         self._plant = None if ideal else plant_rows(scenario, rows, commands)
         self._shape = (rows, joints, coordinates, len(self.preview), *(() if ideal else (commands, obstacles)))
@@ -274,17 +273,15 @@ class Simulator:
         self._step(numbers, active, moving, start, stop)
 
     def _step(self, *command: Any) -> None:
-        step = simulation.step if self._plant is None else plant_step.step
         step(*self._constants, *command)
 
     def _take_apart(self) -> None:
-        """The constant arguments of a step: single arrays for :func:`simulation.step`, tuples for that of a plant."""
+        """The constant arguments of :func:`ikgym.plant.step.step`."""
         plant, cost, state = self._plant, self.scenario.cost.parameters, self._state
-        if plant is None:
-            self._constants: tuple[Any, ...] = *self.scenario.arm.chain, *self._shared, *cost, *state
-        else:
-            fixed = self._shared, cost, plant.drives, plant.sensors
-            self._constants = *fixed, plant.arms, state, plant.state, plant.contacts
+        of_plant: tuple[Any, ...] = (), None
+        if plant is not None:
+            of_plant = (plant.drives, plant.sensors, plant.arms, plant.state), plant.contacts
+        self._constants: tuple[Any, ...] = *self.scenario.arm.chain, *self._shared, *cost, *state, *of_plant
         nominal, more = self._nominal, (state.frames, state.step)
         self._motions = (*nominal.arguments(), *more) if isinstance(nominal, MotionFrames) else ()
 

@@ -1,8 +1,4 @@
-"""Kernel: one step of N arms whose plant is ideal; :mod:`ikgym.plant.step` is the one of all others.
-
-Everything that happens in a step happens here, row by row, so that one environment, many of them in a loop and the
-native vector environment agree bit for bit, whatever the number of threads.
-"""
+"""Constants and state of N arms, and kernels for what a step shows of them; :mod:`ikgym.plant.step` moves the arms."""
 
 from __future__ import annotations
 
@@ -15,12 +11,8 @@ import numpy.typing as npt
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.axes import angle_between
-from ikgym.kernels.cost import CostParameters
-from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
-from ikgym.kernels.kinematics import Chain, forward
-from ikgym.kernels.limits import LOWER, SLACK, UPPER, driven, stopped
+from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.outcome import Outcome as Outcome
-from ikgym.kernels.outcome import parts
 from ikgym.kernels.rotations import geodesic_angle
 
 Floats = npt.NDArray[np.float64]
@@ -64,8 +56,6 @@ class State(NamedTuple):
         step: Steps made in the episode. Shape (N,).
         frames: Nominal frames of the rows' episodes, or those that are near, see :mod:`ikgym.kernels.tasks`; shared
             where the first length is 1. Shape (N or 1, points, 12 or 3).
-        scratch: Working memory of the kernel: a frame, nominal task coordinates and their error, at its
-            first row. Shape (N, 12 + m + e).
     """
 
     actions: Floats
@@ -73,10 +63,6 @@ class State(NamedTuple):
     qdot: Floats
     step: Integers
     frames: Floats
-    scratch: Floats
-
-
-_parts = expanded(parts)
 
 
 @kernel
@@ -163,103 +149,6 @@ def show_row(constants, cost, state, row, pose, frame, shown):
     if constants.counted[k]:
         shown.tracking_cost[row] = _tracking(kind, cost, target, pose, nominal, error)
         shown.velocity_cost[row] = cost_kernels.velocity(cost, state.qdot[row])
-
-
-@kernel
-def step(
-    # Chain.
-    offsets,
-    axes,
-    prismatic,
-    tool,
-    tool_rotation,
-    # Constants.
-    kind,
-    dt,
-    velocity_limit,
-    steps,
-    point,
-    counted,
-    preview,
-    limits,
-    # CostParameters.
-    delta_x,
-    p_x,
-    delta_qdot,
-    p_out,
-    p_in,
-    # State, changed in place.
-    actions,
-    q,
-    qdot,
-    made,
-    tables,
-    scratch,
-    # The command.
-    numbers,
-    active,
-    moving,
-    start,
-    stop,
-):
-    """Moves rows, and observes them.
-
-    The arguments are the parts of :class:`Chain`, :class:`Constants`, :class:`CostParameters` and :class:`State`; then
-    the block of an outcome, written in place; the rows that are meant, of shape (N,); whether they move or are observed
-    where they are; the first row, and the row after the last.
-
-    The tuples are taken apart by the caller, since this is called once a step: a call with 32 values takes 3.5 µs, with
-    the same values in four named tuples 8.2 µs (medians on one machine, by empty kernels). And numba counts references
-    at each access to a part of a tuple, which in the loop over rows takes longer than the kinematics.
-    """
-    chain = Chain(offsets, axes, prismatic, tool, tool_rotation)
-    constants = Constants(kind, dt, velocity_limit, steps, point, counted, preview, limits)
-    cost = CostParameters(delta_x, p_x, delta_qdot, p_out, p_in)
-    state = State(actions, q, qdot, made, tables, scratch)
-    rows, n = q.shape
-    p = preview.shape[0]
-    shown = _parts(numbers, rows, n, (numbers.shape[0] // rows - 2 * n - 9) // (p + 1), p)
-    _rows(chain, constants, cost, state, shown, active, moving, start, stop)
-
-
-@uncounted
-def _rows(chain, constants, cost, state, shown, active, moving, start, stop):
-    """The rows of :func:`step`, with the parts of the outcome in a tuple."""
-    q, qdot, m = state.q, state.qdot, shown.pose.shape[1]
-    # Each call has the scratch of its first row to itself.
-    rotation, position = state.scratch[start, :9].reshape(3, 3), state.scratch[start, 9:12]
-    nominal, error = state.scratch[start, 12 : 12 + m], state.scratch[start, 12 + m :]
-    for row in range(start, stop):
-        if not active[row]:
-            continue
-        shown.clipped[row] = 0.0
-        shown.at_limit[row, 0] = shown.at_limit[row, 1] = shown.at_limit[row, 2] = 0.0
-        if moving:
-            _move(constants, state, row, shown.clipped, shown.at_limit)
-            state.step[row] += 1
-        for j in range(q.shape[1]):
-            shown.q[row, j] = q[row, j]
-            shown.qdot[row, j] = qdot[row, j]
-        forward(chain, q[row], rotation, position)
-        show_row(constants, cost, state, row, shown.pose[row], (rotation, position, nominal, error), shown)
-
-
-@inlined
-def _move(constants, state, row, clipped, at_limit):
-    """Moves the joints of a row: velocity limit, acceleration limit, stop."""
-    dt, velocity_limit, limits = constants.dt, constants.velocity_limit, constants.limits
-    q, qdot, limited = state.q, state.qdot, limits.shape[0] > 0
-    for j in range(q.shape[1]):
-        applied = commanded(state.actions[row, j], velocity_limit[j], clipped, row)
-        slack = SLACK * velocity_limit[j]
-        if limited:
-            applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
-        velocity = applied
-        reached = q[row, j] + dt * velocity  # Varga 2021, eq. 5
-        if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-            reached, applied = stopped(limits, j, q[row, j], reached, dt)
-            at_limit[row, 0] += abs(velocity - applied) > slack
-        q[row, j], qdot[row, j] = reached, applied
 
 
 @inlined

@@ -26,7 +26,7 @@ def disturbed(velocity, bias, noise, key, counter):
 
 @inlined
 def engaged(play, row, j, backlash, way):
-    """Motion of the joint when its drive moves by ``way`` within the backlash.
+    """Motion of the joint when its drive moves by ``way`` within the backlash, all of it without one.
 
     Args:
         play: How far drives are from the middle of their backlash. Shape (N, n).
@@ -35,6 +35,8 @@ def engaged(play, row, j, backlash, way):
         backlash: Its width in [rad] or [m].
         way: Motion of the drive, in [rad] or [m].
     """
+    if backlash == 0.0:
+        return way
     half, reached = 0.5 * backlash, play[row, j] + way
     play[row, j] = min(max(reached, -half), half)
     return reached - play[row, j]

@@ -176,7 +176,7 @@ def through_law(output, j, by_command, due, speed, dt, into, by_due):
 
 @inlined
 def unlimited(limits, velocity_limit, j, command, move, by, dt):
-    """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.kernels.simulation.step`.
+    """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.plant.step.step`.
 
     Args:
         limits: Shape (4, n), or (0, n).
