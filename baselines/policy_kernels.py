@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import types
+import zlib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -166,7 +167,7 @@ def entry(step: Any, numbers: type, memory: type, remembers: bool) -> Any:
     python = getattr(step, "py_func", step)
     scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory, "remembers": remembers}
     call = types.FunctionType(_call.__code__, scope, f"{python.__name__}_call")
-    name = f"{python.__name__}_{numbers.__name__}_{memory.__name__}"
+    name = f"{python.__name__}_{zlib.crc32(numbers.__name__.encode()):08x}_{memory.__name__}"
     call.__module__, call.__qualname__ = python.__module__, f"{name}_remembering" if remembers else name
     return kernel(call)
 

@@ -52,12 +52,8 @@ class Frozen:
 @functools.cache
 def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
     """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
-    hints: dict[str, Any] = {}
+    hints = hints_of(kind)
     found: dict[str, tuple[Callable[[str, Any], Any], bool]] = {}
-    for base in reversed(kind.__mro__):
-        # Those of a user's class may name things that are known to type checkers alone.
-        with contextlib.suppress(NameError, AttributeError):
-            hints |= typing.get_type_hints(base, include_extras=True)
     for name in (field.name for field in dataclasses.fields(kind) if field.init and field.name in hints):
         hint = hints[name]
         parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
@@ -68,6 +64,16 @@ def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
         for check in filter(callable, getattr(given[0], "__metadata__", ())):
             found[name] = check, len(given) < len(parts)
     return found
+
+
+def hints_of(kind: type[Any]) -> dict[str, Any]:
+    """The annotations of a class and its bases, with all that :data:`typing.Annotated` adds."""
+    hints: dict[str, Any] = {}
+    for base in reversed(kind.__mro__):
+        # Those of a user's class may name things that are known to type checkers alone.
+        with contextlib.suppress(NameError, AttributeError):
+            hints |= typing.get_type_hints(base, include_extras=True)
+    return hints
 
 
 def _instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:

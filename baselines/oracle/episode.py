@@ -10,12 +10,12 @@ from gymnasium.utils import seeding
 
 from baselines.episodes import Simulation, rollouts
 from baselines.policy import SolverPolicy
+from baselines.policy.surroundings import swept
 from baselines.recording import add_up
 from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
-from baselines.solvers.surroundings import swept
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario

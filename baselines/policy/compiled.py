@@ -5,14 +5,16 @@ from __future__ import annotations
 import abc
 import functools
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy.arguments import Parts, not_finite
+from baselines.policy.fields import kernel_fields, named_tuple
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
+from baselines.policy.surroundings import surroundings_of
 from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
@@ -22,28 +24,37 @@ from ikgym.validation import FloatArray, read_only
 class CompiledPolicy(SolverPolicy, abc.ABC):
     """Base of solvers that are one kernel, ``step(model, numbers, seen, memory, answer)``.
 
-    The kernel is given the :class:`Model`, the named tuple of :meth:`numbers`, the observations as :class:`Seen`, and
-    the memory as the named tuple of :meth:`memory`; it turns the memory into the next one in place and fills in the
-    :class:`Answer`. Checks, batches, threads and the cut to the velocity limit are dealt with here.
+    The kernel is given the :class:`Model`, the policy's fields as a named tuple, see :meth:`numbers`, the observations
+    as :class:`Seen`, and the memory as the named tuple of :meth:`memory`; it turns the memory into the next one in
+    place and fills in the :class:`Answer`. Checks, batches, threads and the cut to the velocity limit are dealt with
+    here.
     """
 
     sees_extras: ClassVar[bool] = False
     #: The kernel.
     step: ClassVar[Callable[..., None]]
-    #: The kernel among bodies, with the numbers of :meth:`numbers_among`; None for a policy that is blind to them.
+    #: The kernel among bodies; None for a policy that is blind to them. Its numbers end with ``bodies`` and ``boxes``:
+    #: see :func:`surroundings_of`; the latter has the shape (1, o, 16) or (B, o, 16).
     step_among: ClassVar[Callable[..., None] | None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._settle(sees_extras=self.among_bodies and self.problem.obstacles_shown)
 
-    @abc.abstractmethod
-    def numbers(self) -> NamedTuple:
-        """The parameters as the kernel takes them: a named tuple of numbers and arrays."""
+    @classmethod
+    def kernel_fields(cls) -> tuple[str, ...]:
+        """Fields that the kernel takes: those of the class that has it, so that subclasses share what is compiled."""
+        return kernel_fields(next(kind for kind in cls.__mro__ if "step" in vars(kind)))
 
-    def numbers_among(self) -> NamedTuple:
-        """The parameters of the kernel among bodies; the last are the obstacles, of shape (1, o, 16) or (B, o, 16)."""
-        raise NotImplementedError
+    def numbers(self) -> Any:
+        """The policy's fields as the kernel takes them, a named tuple: those with a number, and derived ones.
+
+        See :func:`baselines.policy.fields.derived`. Tuples among them are plain.
+        """
+        names, among = self.kernel_fields(), self.among_bodies
+        values = [getattr(self, name) for name in names] + [*(surroundings_of(self.problem) if among else ())]
+        plain = [tuple(value) if isinstance(value, tuple) else value for value in values]
+        return named_tuple((*names, *(("bodies", "boxes") if among else ())))(*plain)
 
     @property
     def among_bodies(self) -> bool:
@@ -118,7 +129,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     def _kernel(self) -> tuple[Any, FloatArray, tuple[Any, ...], int]:
         """The compiled call, its arguments that never change, and the number of joints."""
         n, m, among = self.problem.model.joints, self.problem.task.size, self.among_bodies
-        numbers = self.numbers_among() if among else self.numbers()
+        numbers: tuple[Any, ...] = self.numbers()
         step = type(self).step_among if among else type(self).step
         call = _entry(step, type(numbers), type(self._example), self.remembers_command)
         block, kept = _block(self.problem, self.remembers_command), tuple(numbers)

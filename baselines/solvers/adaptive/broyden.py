@@ -35,23 +35,12 @@ class BroydenMemory(NamedTuple):
     pose: FloatArray
 
 
-class BroydenNumbers(NamedTuple):
-    """The parameters of :class:`Broyden` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        damping: λ.
-        motion: ε.
-    """
-
-    gain: float
-    damping: float
-    motion: float
-
-
 @kernel
 def broyden_step(model, numbers, seen, memory, answer):
-    """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments."""
+    """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments.
+
+    Iterations are 0 where nothing has been measured before, and 1 later.
+    """
     answer.iterations[:] = memory.known
     nominal = NominalMemory(memory.nominal, memory.known)
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, nominal)
@@ -133,7 +122,3 @@ class Broyden(DampedLeastSquares):
         before = NominalMemory(*super().memory(rows))
         q, pose = np.zeros((rows, n)), np.zeros((rows, task.size))
         return BroydenMemory(before.nominal, before.known, learnt, q, pose)
-
-    def numbers(self) -> BroydenNumbers:  # type: ignore[override]  # of another kernel
-        """See :meth:`CompiledPolicy.numbers`; iterations are 0 where nothing has been measured before, 1 later."""
-        return BroydenNumbers(self.gain, self.damping, self.motion)

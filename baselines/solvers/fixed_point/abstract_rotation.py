@@ -12,6 +12,7 @@ import numpy as np
 
 from baselines.policy import Memory, Problem
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.fields import derived
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
@@ -54,31 +55,12 @@ class RotationMemory(NamedTuple):
     held: FloatArray
 
 
-class RotationNumbers(NamedTuple):
-    """The parameters of :class:`AbstractRotation` as its kernel takes them.
-
-    Attributes:
-        task_weights: The diagonal of ℱ. Shape (m,).
-        joint_weights: The diagonal of 𝒲. Shape (n,).
-        counter_rotation: One of the numbers in COUNTER_ROTATIONS.
-        deformation: One of the numbers in DEFORMATIONS.
-        rule: R_a, λ_a, ``epsa`` and ``q_pp_max``.
-        tolerance: ‖xᴺ - f‖ up to which the iteration has converged.
-    """
-
-    task_weights: FloatArray
-    joint_weights: FloatArray
-    counter_rotation: int
-    deformation: int
-    rule: tuple[float, float, float, float]
-    tolerance: float
-
-
 @kernel
 def rotation_step(model, numbers, seen, memory, answer):
     """One inner iteration, row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt = model.chain, model.kind, model.dt
-    task_weights, joint_weights, counter_rotation, deformation, rule, tolerance = numbers
+    counter_rotation, deformation = numbers.codes
+    rule = numbers.r_a, numbers.share, EPSA, Q_PP_MAX
     q, pose, nominal, (direction, angles, point, held) = seen.q, seen.pose, seen.nominal, memory
     goals, status, iterations = answer
     n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
@@ -93,9 +75,9 @@ def rotation_step(model, numbers, seen, memory, answer):
         task_kernels.coordinate_jacobian(kind, rotation, geometric, jacobian)
         for i in range(m):
             error[i] = target[i] - pose[row, i]
-            missing[i] = task_weights[i] * error[i]
-            seen[i] = task_weights[i] * pose[row, i]
-            wanted[i] = task_weights[i] * target[i]
+            missing[i] = numbers.f[i] * error[i]
+            seen[i] = numbers.f[i] * pose[row, i]
+            wanted[i] = numbers.f[i] * target[i]
         angles[row, 0] = 0.0
         if counter_rotation == _TASK:
             angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
@@ -107,15 +89,15 @@ def rotation_step(model, numbers, seen, memory, answer):
         for i in range(turned):
             direction[row, i] = missing[i] if counter_rotation == _TASK else h[i]
         for j in range(n):
-            actual[j] *= joint_weights[j]
-            desired[j] *= joint_weights[j]
+            actual[j] *= numbers.w[j]
+            desired[j] *= numbers.w[j]
         for j in range(n):
             goal[j] = q[row, j]
-        status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= tolerance else _LIMIT
+        status[row] = _CONVERGED if math.sqrt(dot(error, error)) <= numbers.tolerance else _LIMIT
         if deformation == _CONTRACTION:
             angles[row, 1] = math.nan
             for j in range(n):
-                goal[j] += rule[1] * (desired[j] - actual[j])
+                goal[j] += numbers.share * (desired[j] - actual[j])
         else:
             angles[row, 1] = adaptive_deform(actual, q[row], desired, rule, extended, goal)
             if math.isnan(angles[row, 1]):
@@ -210,19 +192,26 @@ class AbstractRotation(CompiledPolicy):
     deformation: str = parameter("rotation", choice, available=DEFORMATIONS)
     jacobian: str = parameter("step", choice, available=("step", "point"))
     tolerance: float = parameter(1e-3, number, at_least=0.0)
-    _weights: tuple[FloatArray, FloatArray] = dataclasses.field(init=False, repr=False)
+    #: λ_a, given or chosen.
+    share: float = derived()
+    #: The diagonal of ℱ. Shape (m,).
+    f: FloatArray = derived()
+    #: The diagonal of 𝒲. Shape (n,).
+    w: FloatArray = derived()
+    #: The numbers of counter-rotation and deformation in the kernel.
+    codes: tuple[int, int] = derived()
 
     name: ClassVar[str] = "abstract_rotation"
     step = rotation_step
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.lambda_a is None:
-            self._settle(lambda_a=_share(self.problem))
+        share = _share(self.problem) if self.lambda_a is None else self.lambda_a
+        codes = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
         sizes = {"task_weights": self.problem.task.size, "joint_weights": self.problem.model.joints}
         weights = tuple(_checked_weights(name, getattr(self, name), size) for name, size in sizes.items())
         plain = {name: as_given(getattr(self, name), array) for name, array in zip(sizes, weights, strict=True)}
-        self._settle(_weights=weights, **plain)
+        self._settle(lambda_a=share, share=share, f=weights[0], w=weights[1], codes=codes, **plain)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`RotationMemory` without a step before."""
@@ -236,12 +225,6 @@ class AbstractRotation(CompiledPolicy):
         """The angles of both rotations in [rad], NaN where there was none (Fig. 6, 15 and 18), each of shape (B,)."""
         angles = RotationMemory(*self.memory_of(state)).angles
         return {"angle_counter_rotation": angles[:, 0].copy(), "angle_abstract_rotation": angles[:, 1].copy()}
-
-    def numbers(self) -> RotationNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        kinds = COUNTER_ROTATIONS[self.counter_rotation], DEFORMATIONS[self.deformation]
-        rule = self.r_a, self.lambda_a, EPSA, Q_PP_MAX
-        return RotationNumbers(*self._weights, *kinds, rule, self.tolerance)  # type: ignore[arg-type]  # λ_a is known
 
 
 def _share(problem: Problem) -> float:

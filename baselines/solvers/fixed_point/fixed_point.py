@@ -11,17 +11,16 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.fields import derived
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
 from baselines.solvers.fixed_point.iteration import (
     TRANSFORMATIONS,
-    Contraction,
     FixedPointMemory,
-    FixedPointNumbers,
     fixed_point_step,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import number, whole_number
+from ikgym.validation import FloatArray, IntArray, number, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
@@ -76,8 +75,16 @@ class FixedPoint(CompiledPolicy):
     tolerance: float = parameter(1e-6, number, at_least=0.0)
     components: Sequence[int] | None = None
     length: float | None = parameter(None, number, above=0.0)
-    #: F.
-    function: Contraction = dataclasses.field(init=False, repr=False)
+    #: The number of the transformation in the kernel.
+    code: int = derived()
+    #: A, given or chosen.
+    factor: float = derived()
+    #: ξ* (Faitli 2018, section 2.2, with the slope ½).
+    fixed_point: float = derived()
+    #: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
+    corrected_by: IntArray = derived()
+    #: Weights of the squares of the components of f - x. Shape (e,).
+    weights: FloatArray = derived()
 
     name: ClassVar[str] = "fixed_point"
     step = fixed_point_step
@@ -87,29 +94,25 @@ class FixedPoint(CompiledPolicy):
         self._settle(components=self._checked_components(), length=self._checked_length())
         if self.slope == 0.0:
             raise InvalidInputError("slope: expected a number between -1 and 1 other than 0, got 0.")
-        self._settle(function=Contraction(self.slope, self.d, self.d / (1.0 - self.slope)))
-        self._settle(a=self._contracting() if self.a is None else self.a)
-        if self.a == 0.0:
+        factor = self._contracting() if self.a is None else self.a
+        if factor == 0.0:
             raise InvalidInputError("a: expected a number other than 0, got 0: nothing would move.")
+        corrected_by = np.array(self.components or range(self.problem.model.joints))
+        corrected_by.flags.writeable = False
+        self._settle(
+            a=factor,
+            code=TRANSFORMATIONS[self.transformation],
+            factor=factor,
+            fixed_point=self.d / (1.0 - self.slope),
+            corrected_by=corrected_by,
+            weights=read_only(error_weights(self.problem.task, self._metres)),
+        )
 
     def memory(self, rows: int) -> Memory:
         """A :class:`FixedPointMemory` without a step before."""
         if self.transformation == "sign_by_growth":
             return FixedPointMemory(np.tile([1.0, np.inf], (rows, 1)))
         return FixedPointMemory(np.zeros((rows, self.problem.model.joints if self.transformation == "sign" else 0)))
-
-    def numbers(self) -> FixedPointNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return FixedPointNumbers(
-            TRANSFORMATIONS[self.transformation],
-            tuple(self.function),
-            self.a,  # type: ignore[arg-type]  # known by now
-            self.iterations,
-            self.tolerance,
-            self.problem.velocity_limit * self.problem.dt,
-            np.array(self.components or range(self.problem.model.joints)),
-            error_weights(self.problem.task, self._metres),
-        )
 
     def _checked_components(self) -> tuple[int, ...] | None:
         size, joints = self.problem.task.error_size, self.problem.model.joints

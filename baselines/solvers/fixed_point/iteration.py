@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
@@ -21,20 +20,6 @@ _TRANSPOSE, _SIGN, _BY_GROWTH = (TRANSFORMATIONS[name] for name in ("transpose",
 _CONVERGED, _LIMIT, _DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.DIVERGED)
 
 
-class Contraction(NamedTuple):
-    """F(ξ) = slope · ξ + D with its fixed point ξ* (Faitli 2018, section 2.2, with the slope ½).
-
-    Attributes:
-        slope: Of an absolute value below 1, not 0.
-        d: D, the shift.
-        fixed_point: ξ*.
-    """
-
-    slope: float
-    d: float
-    fixed_point: float
-
-
 class FixedPointMemory(NamedTuple):
     """Memory of the sign variants: the last iteration of the previous step.
 
@@ -46,37 +31,12 @@ class FixedPointMemory(NamedTuple):
     previous: FloatArray
 
 
-class FixedPointNumbers(NamedTuple):
-    """The parameters of :class:`FixedPoint` as its kernel takes them.
-
-    Attributes:
-        transformation: One of the numbers in TRANSFORMATIONS.
-        function: F, a plain :class:`Contraction`.
-        a: A.
-        iterations: How many are made.
-        tolerance: ‖f - x‖ up to which they have converged.
-        longest: How far the joints can go in one step, in [rad] or [m]. Shape (n,).
-        components: Which component of f - x corrects each joint where there is no Jacobian. Shape (n,).
-        weights: Weights of the squares of the components of f - x, if any. Shape (e,).
-    """
-
-    transformation: int
-    function: tuple[Any, ...]
-    a: float
-    iterations: int
-    tolerance: float
-    longest: FloatArray
-    components: npt.NDArray[np.int64]
-    weights: FloatArray
-
-
 @kernel
 def fixed_point_step(model, numbers, seen, memory, answer):
     """The iterations of one step, row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt = model.chain, model.kind, model.dt
-    function, transformation, a = Contraction(*numbers.function), numbers.transformation, numbers.a
-    iterations, tolerance, longest = numbers.iterations, numbers.tolerance, numbers.longest
-    components, weights = numbers.components, numbers.weights
+    transformation, corrected_by, weights = numbers.code, numbers.corrected_by, numbers.weights
+    iterations, tolerance = numbers.iterations, numbers.tolerance
     starts, nominal, previous = seen.q, seen.nominal, memory.previous
     q, status, made = answer
     n, m = q.shape[1], nominal.shape[2]
@@ -105,7 +65,7 @@ def fixed_point_step(model, numbers, seen, memory, answer):
                 _add_transposed(jacobian, weighted, h)
             else:
                 for j in range(n):
-                    h[j] = -error[components[j]]
+                    h[j] = -error[corrected_by[j]]
             residual = math.sqrt(dot(error, error))
             if step == 0:
                 first = residual
@@ -115,12 +75,12 @@ def fixed_point_step(model, numbers, seen, memory, answer):
                 _keep_direction(h, previous[row])
             elif transformation == _BY_GROWTH:
                 _turn_where_grown(h, previous[row])
-            _contract(function, a, h, here)
+            _contract(numbers.slope, numbers.d, numbers.fixed_point, numbers.factor, h, here)
         status[row] = _CONVERGED if residual <= tolerance else _LIMIT
         # Further off than at the start, and further away than the drives can go.
         if not residual <= first:
             for j in range(n):
-                if not abs(here[j] - start[j]) <= longest[j]:
+                if not abs(here[j] - start[j]) <= model.unit[j] * dt:
                     status[row] = _DIVERGED
         for j in range(n):
             here[j] = ((start[j] if status[row] == _DIVERGED else here[j]) - start[j]) / dt
@@ -132,12 +92,12 @@ def fixed_point_step(model, numbers, seen, memory, answer):
 
 
 @inner
-def _contract(function, a, h, q):
-    """Eq. 1; where h = 0 its limit, which is to stay."""
+def _contract(slope, d, fixed_point, a, h, q):
+    """Eq. 1 with F(ξ) = slope · ξ + D and its fixed point ξ*; where h = 0 its limit, which is to stay."""
     norm = math.sqrt(dot(h, h))
     if norm == 0.0:
         return
-    amount = function.slope * (a * norm + function.fixed_point) + function.d - function.fixed_point
+    amount = slope * (a * norm + fixed_point) + d - fixed_point
     for j in range(q.shape[0]):
         q[j] += amount * (h[j] / norm)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.levenberg_marquardt.damping import (
     RULES,
@@ -19,7 +20,7 @@ from baselines.solvers.levenberg_marquardt.damping import (
     interval_bounds,
     rule_defaults,
 )
-from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, IterationNumbers, iteration_step
+from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, iteration_step
 from ikgym.validation import FloatArray, flag, number, whole_number
 
 
@@ -84,7 +85,16 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     tolerance: float = parameter(1e-10, number, at_least=0.0)
     iterations: int = parameter(500, whole_number, at_least=1)
     one_step: bool = parameter(False, flag)
-    law: DampingLaw = dataclasses.field(init=False, repr=False)
+    #: The rule with its numbers.
+    law: DampingLaw = derived()
+    #: Whether λ is kept from period to period.
+    carries: bool = derived()
+    #: n, the points of the horizon; 1 without prediction.
+    points: int = derived()
+    #: Whether the Jacobians follow the predicted path (56).
+    predicted: bool = derived()
+    #: Whether the error of the whole horizon is tested (40), or that of the first point only.
+    whole_horizon: bool = derived()
 
     step = iteration_step
 
@@ -92,26 +102,9 @@ class DampedIteration(CompiledPolicy, abc.ABC):
         super().__post_init__()
         given = {name: getattr(self, name) for rule in RULES.values() for name in rule.numbers}
         missing = rule_defaults(self.rule, given, self.problem.model)
-        self._settle(**missing, law=damping_law(self.rule, given | missing))
-
-    @property
-    def rank(self) -> int:
-        """The rank of a Jacobian that has lost nothing; with redundant coordinates it is that of a rigid motion."""
-        return min(self.problem.task.error_size, self.problem.model.joints, 6)
-
-    def numbers(self) -> IterationNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        problem = self.problem
-        return IterationNumbers(
-            tuple(self.law),
-            problem.task.error_size,
-            self.rank,
-            problem.dt * problem.velocity_limit,
-            self.tolerance,
-            self.iterations,
-            self.one_step,
-            bool(self.carry),
-        )
+        self._settle(**missing)
+        law = damping_law(self.rule, given | missing)
+        self._settle(law=law, carries=bool(self.carry), points=1, predicted=False, whole_horizon=False)
 
     def memory(self, rows: int) -> Memory:
         """A :class:`DampingMemory` without a step before."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,36 +28,6 @@ DEFICIENT, DIVERGED = int(Status.RANK_DEFICIENT), int(Status.DIVERGED)
 RANK_TOLERANCE = 1e-12
 
 
-class IterationNumbers(NamedTuple):
-    """The parameters of an iteration as its kernel takes them.
-
-    Attributes:
-        law: A plain :class:`DampingLaw`.
-        size: Components of the error, e.
-        rank: The rank that J has where nothing is lost.
-        longest: Way of each joint in one period at the velocity limit, in [rad] or [m]. Shape (n,).
-        tolerance: δ.
-        most: N_up.
-        one_step: Whether the controller is applied once to the measured pose instead.
-        carry: Whether λ is kept from period to period.
-        horizon: n, the points of the horizon; 1 without prediction.
-        predicted: Whether the Jacobians follow the predicted path (56).
-        whole_horizon: Whether the error of the whole horizon is tested (40), or that of the first point only.
-    """
-
-    law: tuple[Any, ...]
-    size: int
-    rank: int
-    longest: FloatArray
-    tolerance: float
-    most: int
-    one_step: bool
-    carry: bool
-    horizon: int = 1
-    predicted: bool = False
-    whole_horizon: bool = False
-
-
 class DampingMemory(NamedTuple):
     """Memory of the previous step; a kernel changes it in place.
 
@@ -74,12 +44,13 @@ class DampingMemory(NamedTuple):
 def iteration_step(model, numbers, seen, memory, answer):
     """The iteration (34)-(41), with one point (11)-(17), row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt, rule = model.chain, model.kind, model.dt, DampingLaw(*numbers.law)
-    size, rank, longest, tolerance = numbers.size, numbers.rank, numbers.longest, numbers.tolerance
-    most, one_step, carry = numbers.most, numbers.one_step, numbers.carry
-    horizon, predicted, whole_horizon = numbers.horizon, numbers.predicted, numbers.whole_horizon
+    tolerance, most, one_step, horizon = numbers.tolerance, numbers.iterations, numbers.one_step, numbers.points
+    predicted, whole_horizon = numbers.predicted, numbers.whole_horizon
     starts, poses, nominal, (damping, error_before) = seen.q, seen.pose, seen.nominal, memory
     q, status, iterations = answer
     n, m = q.shape[1], poses.shape[1]
+    size = task_kernels.error_size(kind, m)
+    rank = min(size, n, 6)  # redundant coordinates add none
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     present, coordinates = np.empty(m), np.empty(m)
     path, jacobians = np.empty((horizon, n)), np.empty((horizon, size, n))
@@ -93,7 +64,7 @@ def iteration_step(model, numbers, seen, memory, answer):
         for k in range(n):
             here[k] = start[k]
         status[row], i, first = LIMIT, 0, 0.0
-        if not carry:
+        if not numbers.carries:
             damping[row], error_before[row] = rule.damping, np.inf
         while True:
             # y(k)_(i), J(k)_(i) and the residuals of all points from there (55).
@@ -157,7 +128,7 @@ def iteration_step(model, numbers, seen, memory, answer):
                 break
         iterations[row] = i
         if not one_step and first_square > first:
-            stop_run_away(here, start, longest, status[row : row + 1])
+            stop_run_away(here, start, model.unit, dt, status[row : row + 1])
         finish(dt, rule, row, start, status[row], memory, here)
 
 
@@ -181,18 +152,19 @@ def _apply(steps, path, here):
 
 
 @inner
-def stop_run_away(here, start, longest, status):
+def stop_run_away(here, start, unit, dt, status):
     """Marks a row that has not converged as diverged where a joint has moved farther than it can in one period.
 
     Args:
         here: Joint coordinates in [rad] or [m]. Shape (n,).
         start: Those at the start of the period. Shape (n,).
-        longest: Way of each joint in one period at the velocity limit. Shape (n,).
+        unit: The velocity limit in [rad/s] or [m/s]. Shape (n,).
+        dt: The period in [s].
         status: The row's status, changed in place. Shape (1,).
     """
     excess = -np.inf
     for k in range(here.shape[0]):
-        excess = max(excess, abs(here[k] - start[k]) - longest[k])
+        excess = max(excess, abs(here[k] - start[k]) - dt * unit[k])
     if status[0] != CONVERGED and excess > 0.0:
         status[0] = DIVERGED
 

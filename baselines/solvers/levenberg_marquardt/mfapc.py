@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.levenberg_marquardt.base import DampedIteration
-from baselines.solvers.levenberg_marquardt.iteration import IterationNumbers
 from ikgym.validation import whole_number
 
 
@@ -54,12 +53,12 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
 
     name: ClassVar[str] = "mfapc"
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        predicted, whole = self.jacobians == "predicted", self.stop == "horizon"
+        self._settle(points=self.horizon, predicted=predicted, whole_horizon=whole)
+
     @property
     def preview(self) -> int:
         """The n points that lie ahead."""
         return self.horizon
-
-    def numbers(self) -> IterationNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        predicted, whole = self.jacobians == "predicted", self.stop == "horizon"
-        return super().numbers()._replace(horizon=self.horizon, predicted=predicted, whole_horizon=whole)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
-from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
 from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
@@ -17,7 +14,6 @@ from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 from ikgym.kernels.linear_algebra import cholesky
-from ikgym.validation import FloatArray
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # Share of the way to the clearance that a step may take, the distance for joint motions in the null space, in
@@ -31,26 +27,6 @@ RETREAT, BRAKES = 0.1, 0.5
 LEVER, AWAY, TO_STOP = 0.05, 0.5, 3.0
 # A row that is met so closely holds the arm back, in [m/s].
 MET = 1e-9
-
-
-class AmongBodiesNumbers(NamedTuple):
-    """The parameters of the quadratic program among bodies as its kernel takes them.
-
-    Attributes:
-        program: Those of the quadratic program.
-        clearance: The distance that is kept, in [m].
-        influence: The distance from which on a pair is looked at, in [m].
-        repulsion: How strongly the joints are led away from near bodies, in [1/s].
-        bodies: See :class:`baselines.solvers.surroundings.Around`.
-        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
-    """
-
-    program: QuadraticProgramNumbers
-    clearance: float
-    influence: float
-    repulsion: float
-    bodies: FloatArray
-    boxes: FloatArray
 
 
 @inlined
@@ -108,7 +84,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
     joint velocities, and less near a stop.
 
     Args:
-        numbers: The :class:`AmongBodiesNumbers`.
+        numbers: The fields of :class:`QuadraticProgram`.
         dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         projection: P, see :func:`task_free`. Shape (n, n).
@@ -122,7 +98,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         How much is left of other preferences: the smallest d / d*, at most 1.
     """
     distances, reaches, bounds, gradients = near
-    n, braking, nearest = velocity.shape[0], numbers.program.limits[BRAKING], 1.0
+    n, braking, nearest = velocity.shape[0], numbers.limits[BRAKING], 1.0
     for j in range(n):
         velocity[j] = 0.0
     for i in range(count):
@@ -143,7 +119,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         for j in range(n):
             velocity[j] += amount * motion[j]
         nearest = min(nearest, distances[i] / reaches[i])
-    _moderate(numbers.program.limits, q, velocity)
+    _moderate(numbers.limits, q, velocity)
     return min(max(nearest, 0.0), 1.0)
 
 
@@ -164,7 +140,7 @@ def _moderate(limits, q, velocity):
 def qp_step_among(model, numbers, seen, memory, answer):
     """One step of :class:`QuadraticProgram` among bodies; see :class:`CompiledPolicy` for the arguments."""
     task, (shapes, checked) = task_motion(model.chain, model.kind, seen, memory), bodies_of(numbers.bodies)
-    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.program.scaling
+    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.task_scaling
     program = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     near = np.empty(ROWS), np.empty(ROWS), np.empty(ROWS), np.zeros((ROWS, size))
     work = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(size)
@@ -178,18 +154,18 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     """The step of one arm."""
     (hessian, linear, lower, upper), (distances, reaches, bounds, rows), q = program, near, seen.q[row]
     (shapes, checked, places), (projection, motion, preferred, away, x) = bodies, work
-    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.program.pull
+    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.pull
     args = shapes, checked, numbers.boxes[row % numbers.boxes.shape[0]], q, numbers.influence
     count = near_distances(model.chain, *args, places, distances, reaches, rows)
     for j in range(q.shape[0]):
         preferred[j] = pull[0, j] * (pull[1, j] - q[j])
-    weight = row_program(model, numbers.program, q, seen.qdot[row], jac, shift, error, preferred, program)
+    weight = row_program(model, numbers, q, seen.qdot[row], jac, shift, error, preferred, program)
     task_free(hessian, weight, projection)
     left = keep_clear(numbers, model.dt, q, projection, count, near, motion, away)
     for j in range(q.shape[0]):
         away[j] -= (1.0 - left) * preferred[j]
         preferred[j] += away[j]
-        linear[j] += weight * numbers.program.weights[j] * away[j]
+        linear[j] += weight * numbers.weights[j] * away[j]
     answer.iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
     for j in range(q.shape[0]):
         qdot[j] = x[j]
@@ -197,5 +173,5 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
     met = False
     for i in range(count):
         met = met or dot(rows[i], x) <= bounds[i] + MET
-    if found and held_back(jac, shift, weight, numbers.program.weights, preferred, qdot, lower, upper, met):
+    if found and held_back(jac, shift, weight, numbers.weights, preferred, qdot, lower, upper, met):
         answer.status[row] = SATURATED

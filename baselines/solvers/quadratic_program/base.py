@@ -6,10 +6,11 @@ import abc
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.resolved_rate.base import ResolvedRate
@@ -20,34 +21,6 @@ from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
 SECONDARY_SHARE = 0.5
 #: Gains in [1/s] by default, where that motion is limited, and elsewhere.
 SOFT_GAIN, GAIN = 2.5, 1.0
-
-
-class QuadraticProgramNumbers(NamedTuple):
-    """The parameters of a :class:`VelocityProgram` as kernels take them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        damping: Weight of the joint motion as a share of that of the task.
-        lm_damping: How much that grows with the error.
-        braking_share: Share of the acceleration limit that the feedback reckons with; 0 if it does not.
-        rotation_weight: Weight of the rotation against the position, in [m/rad].
-        scaling: Whether the task shift is scaled.
-        secondary_share: Largest secondary motion of the joints, as a share of the primary one; inf for any.
-        weights: Weights of the joints. Shape (n,).
-        pull: How strongly the joints are led to a posture, in [1/s], and the posture. Shape (2, n).
-        limits: See :func:`limits_with_braking`. Shape (5, n).
-    """
-
-    gain: float
-    damping: float
-    lm_damping: float
-    braking_share: float
-    rotation_weight: float
-    scaling: bool
-    secondary_share: float
-    weights: FloatArray
-    pull: FloatArray
-    limits: FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,8 +57,16 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     joint_weights: float | Sequence[float] | None = None
     braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
     rotation_weight: float = parameter(1.0, number, above=0.0)
-    _pull: FloatArray = dataclasses.field(init=False, repr=False)
-    _weights: FloatArray = dataclasses.field(init=False, repr=False)
+    #: The part of the acceleration limits that the feedback assumes for braking; 0 where there are none.
+    braking: float = derived()
+    #: Largest secondary motion of the joints relative to the primary one; inf for any.
+    secondary_share: float = derived()
+    #: Weights of the joints. Shape (n,).
+    weights: FloatArray = derived()
+    #: Gains to the posture in [1/s], and the posture. Shape (2, n).
+    pull: FloatArray = derived()
+    #: See :func:`limits_with_braking`. Shape (5, n).
+    limits: FloatArray = derived()
 
     keeps_acceleration: ClassVar[bool] = True
 
@@ -94,7 +75,14 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         if self.secondary_gain is not None:
             self.check_secondary_gain(self.secondary_gain)
         target, gains = self._posture()
-        self._settle(_pull=read_only(np.array([gains, target])), _weights=self.weights_of(self.joint_weights))
+        brakes = np.isfinite(self.problem.model.acceleration_limit).any()
+        self._settle(
+            braking=self.braking_share if brakes else 0.0,
+            secondary_share=SECONDARY_SHARE if self.soft else math.inf,
+            weights=self.weights_of(self.joint_weights),
+            pull=read_only(np.array([gains, target])),
+            limits=limits_with_braking(self.problem),
+        )
 
     def _posture(self) -> tuple[FloatArray, FloatArray]:
         """Target posture of the joints, and gain in [1/s]. Shapes (n,)."""
@@ -114,29 +102,3 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     def soft(self) -> bool:
         """Whether the motion to the posture is limited; among bodies the arm has to give way in time."""
         return not self.among_bodies
-
-    @property
-    def _brakes(self) -> bool:
-        """Whether the feedback is made smaller far from the reference."""
-        return self.braking_share > 0.0 and bool(np.isfinite(self.problem.model.acceleration_limit).any())
-
-    def program_numbers(self, *, scaling: bool) -> QuadraticProgramNumbers:
-        """The parameters as kernels take them.
-
-        Args:
-            scaling: Whether the task shift is scaled.
-        """
-        share = self.braking_share if self._brakes else 0.0
-        limits = limits_with_braking(self.problem)
-        return QuadraticProgramNumbers(
-            self.gain,
-            self.damping,
-            self.lm_damping,
-            share,
-            self.rotation_weight,
-            scaling,
-            SECONDARY_SHARE if self.soft else math.inf,
-            self._weights,
-            self._pull,
-            limits,
-        )

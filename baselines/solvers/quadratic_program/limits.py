@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.policy import Problem
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, read_only
 
 # Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
 ROUNDING = 2.0**-24
@@ -24,4 +24,4 @@ def limits_with_braking(problem: Problem) -> FloatArray:
     model = problem.model
     change = problem.dt * model.acceleration_limit
     braking = np.maximum(change - 2.0 * ROUNDING * problem.velocity_limit, 0.5 * change)
-    return np.array([model.lower, model.upper, problem.largest_qdot, change, braking])
+    return read_only(np.array([model.lower, model.upper, problem.largest_qdot, change, braking]))

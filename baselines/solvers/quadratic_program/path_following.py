@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from baselines.policy import Memory
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
-from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
+from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope
 from baselines.solvers.quadratic_program.path_speed import SEGMENTS, joint_path_ahead, path_speed
@@ -32,7 +33,7 @@ from ikgym.kernels import tasks
 from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, number, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # Samples that the spline needs ahead.
@@ -46,35 +47,14 @@ AMPLE, STUCK = 1.05, 1e-6
 CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
 
 
-class PathNumbers(NamedTuple):
-    """The parameters of :class:`PathFollowing` as its kernel takes them.
-
-    Attributes:
-        program: Those of the quadratic program.
-        stride: Steps of the reference in a segment of the path ahead.
-        segments: Number of segments.
-        latest: Most steps behind the reference.
-        fastest: Largest joint motion in one step that the path ahead is planned with, in [rad] or [m]. Shape (n,).
-        change: Largest change of it from step to step. Shape (n,).
-    """
-
-    program: QuadraticProgramNumbers
-    stride: int
-    segments: int
-    latest: int
-    fastest: FloatArray
-    change: FloatArray
-
-
 @kernel
 def path_step(model, numbers, seen, memory, answer):
     """One step of :class:`PathFollowing`; see :class:`CompiledPolicy` for the arguments."""
-    program, latest = numbers.program, numbers.latest
-    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, program.limits, program.pull
+    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, numbers.limits, numbers.pull
     n, e = q.shape[1], tasks.error_size(model.kind, seen.pose.shape[1])
     hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
     lower, upper, preferred, jac = np.empty(n + 1), np.empty(n + 1), np.empty(n), np.empty((e, n))
-    motion, missing, shift, factor, weights = np.empty(e), np.empty(e), np.empty(e), np.empty((n, n)), program.weights
+    motion, missing, shift, factor, weights = np.empty(e), np.empty(e), np.empty(e), np.empty((n, n)), numbers.weights
     for row in range(q.shape[0]):
         samples, steps, progress = memory.samples[row], memory.steps[row], memory.progress[row]
         remember(samples, steps, seen.nominal[row])
@@ -84,15 +64,15 @@ def path_step(model, numbers, seen, memory, answer):
         velocity_box(limits, dt, q[row], last[row], lower, upper)
         for j in range(n):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
-        weigh_rotation(model.kind, program.rotation_weight, jac, motion, missing)
+        weigh_rotation(model.kind, numbers.rotation_weight, jac, motion, missing)
         jac *= dt
-        missing *= program.gain
-        weight = motion_weight(jac, missing, program.damping, program.lm_damping, weights, limits[FASTEST])
+        missing *= numbers.gain
+        weight = motion_weight(jac, missing, numbers.damping, numbers.lm_damping, weights, limits[FASTEST])
         weight *= SCALING_WEIGHT
         curvature(jac, weight, weights, hessian)
-        if program.braking_share > 0.0 and factorise(hessian, factor):
-            missing *= feedback_share(factor, jac, missing, program.braking_share, limits[CHANGE])
-        least = min(max(steps + 1.0 - latest - progress, 0.0), 1.0)
+        if numbers.braking > 0.0 and factorise(hessian, factor):
+            missing *= feedback_share(factor, jac, missing, numbers.braking, limits[CHANGE])
+        least = min(max(steps + 1.0 - numbers.latest - progress, 0.0), 1.0)
         goals = weight, weights, preferred, speed, least
         made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)
         memory.steps[row], memory.progress[row], memory.speed[row] = steps + 1, progress + made, made
@@ -149,7 +129,7 @@ def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, moti
     tasks.error(model.kind, samples[first % samples.shape[0]], pose, missing)
     missing += passed
     slope(moves, part, SHORT, motion)
-    joint_path_ahead(model, numbers.program, samples, first, passed, motion, q, numbers.stride, tangents)
+    joint_path_ahead(model, numbers, samples, first, passed, motion, q, tangents)
     speed = path_speed(tangents, numbers.stride, part, last, numbers.fastest, numbers.change)
     slope(moves, part, max(speed, SHORT), motion)  # that of this step
     speed = (max(speed, CRAWL) if speed < 1.0 else AMPLE) * _readiness(math.sqrt(dot(missing, missing)))
@@ -191,9 +171,30 @@ class PathFollowing(VelocityProgram):
     lookahead: float = parameter(0.2, number, above=0.0, at_most=60.0)
     longest_lateness: float = parameter(2.0, number, above=0.0, at_most=3600.0)
     acceleration_share: float = parameter(0.9, number, above=0.0, at_most=1.0)
+    #: Steps of the reference in a segment of the path ahead.
+    stride: int = derived()
+    #: Number of segments.
+    segments: int = derived()
+    #: Most steps behind the reference.
+    latest: int = derived()
+    #: Largest joint motion in one step that the path ahead is planned with, in [rad] or [m]. Shape (n,).
+    fastest: FloatArray = derived()
+    #: Its largest change from step to step. Shape (n,).
+    change: FloatArray = derived()
 
     name: ClassVar[str] = "qp_path"
     step = path_step
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        dt, stride = self.problem.dt, max(2, math.ceil(self.preview / SEGMENTS))
+        self._settle(
+            stride=stride,
+            segments=self.preview // stride,
+            latest=math.ceil(self.longest_lateness / dt),
+            fastest=read_only(dt * self.problem.largest_qdot),
+            change=read_only(self.acceleration_share * dt * dt * self.problem.model.acceleration_limit),
+        )
 
     @property
     def soft(self) -> bool:
@@ -210,29 +211,11 @@ class PathFollowing(VelocityProgram):
         """The steps of ``lookahead``, four at least."""
         return max(FEWEST, math.ceil(self.lookahead / self.problem.dt))
 
-    @property
-    def _latest(self) -> int:
-        """The steps of ``longest_lateness``."""
-        return math.ceil(self.longest_lateness / self.problem.dt)
-
     def memory(self, rows: int) -> PathMemory:
         """See :meth:`SolverPolicy.memory`."""
-        kept = self._latest + self.preview + 2
+        kept = self.latest + self.preview + 2
         samples = np.zeros((rows, kept, self.problem.task.size))
         return PathMemory(samples, np.zeros(rows, dtype=np.int64), np.zeros(rows), np.zeros(rows))
-
-    def numbers(self) -> PathNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        dt, model = self.problem.dt, self.problem.model
-        stride = max(2, math.ceil(self.preview / SEGMENTS))
-        return PathNumbers(
-            self.program_numbers(scaling=True),
-            stride,
-            self.preview // stride,
-            self._latest,
-            dt * self.problem.largest_qdot,
-            self.acceleration_share * dt * dt * model.acceleration_limit,
-        )
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """``progress`` along the reference, in steps of it."""

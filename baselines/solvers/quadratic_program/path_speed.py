@@ -18,27 +18,26 @@ SEGMENTS = 20
 
 
 @inner
-def joint_path_ahead(model, program, samples, first, done, now, q, stride, tangents):
+def joint_path_ahead(model, numbers, samples, first, done, now, q, tangents):
     """Tangents of the joint path along the reference ahead: joint motions in one step of the reference.
 
     They are the smallest in terms of the weights of the joints.
 
     Args:
         model: The :class:`Model`.
-        program: The :class:`QuadraticProgramNumbers`.
+        numbers: The fields of :class:`PathFollowing`.
         samples: Samples of the reference, see :class:`PathMemory`. Shape (L, m).
         first: Number of the last sample that was passed.
         done: Motion of the reference since then. Shape (e,).
         now: Its motion in one step now. Shape (e,).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
-        stride: Steps from one sample that is looked at to the next.
         tangents: Receives the tangents, in [rad] or [m], at the place of the arm and at the samples. Shape (s, n).
     """
     n, e, length = q.shape[0], done.shape[0], samples.shape[0]
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, move, way, ahead = np.empty((e, n)), np.empty(e), np.empty(e), q.copy()
-    hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), program.limits[FASTEST]
-    weights = program.weights
+    hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), numbers.limits[FASTEST]
+    weights, stride = numbers.weights, numbers.stride
     for i in range(tangents.shape[0]):
         here = first + i * stride
         tasks.error(model.kind, samples[(here + 1) % length], samples[here % length], move)
@@ -48,8 +47,8 @@ def joint_path_ahead(model, program, samples, first, done, now, q, stride, tange
             move[:] = now
         forward_and_jacobian(model.chain, ahead, rotation, position, geometric)
         tasks.jacobian(model.kind, rotation, geometric, jacobian)
-        weigh_rotation(model.kind, program.rotation_weight, jacobian, move, way)
-        weight = motion_weight(jacobian, move, program.damping, 0.0, weights, fastest)
+        weigh_rotation(model.kind, numbers.rotation_weight, jacobian, move, way)
+        weight = motion_weight(jacobian, move, numbers.damping, 0.0, weights, fastest)
         curvature(jacobian, weight, weights, hessian)
         goal(jacobian, move, 0.0, weights, rest, tangents[i])
         goal(jacobian, way, 0.0, weights, rest, linear)

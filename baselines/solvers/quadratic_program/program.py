@@ -205,7 +205,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
 
     Args:
         model: The :class:`Model`.
-        numbers: The :class:`QuadraticProgramNumbers`.
+        numbers: The fields of :class:`QuadraticProgram`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
         jacobian: J, which becomes J Δt with the weight of the rotation. Shape (e, n).
@@ -227,18 +227,18 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
             jacobian[a, j] *= model.dt
     weights, n, share = numbers.weights, q.shape[0], 1.0
     weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, weights, numbers.limits[FASTEST])
-    weight *= SCALING_WEIGHT if numbers.scaling else 1.0
+    weight *= SCALING_WEIGHT if numbers.task_scaling else 1.0
     curvature(jacobian, weight, weights, hessian)
     factor = np.empty((n, n))
     definite = factorise(hessian, factor)
-    if definite and numbers.braking_share > 0.0:
-        share = feedback_share(factor, jacobian, error, numbers.braking_share, numbers.limits[CHANGE])
+    if definite and numbers.braking > 0.0:
+        share = feedback_share(factor, jacobian, error, numbers.braking, numbers.limits[CHANGE])
     if definite and numbers.secondary_share < math.inf:
         limit_secondary(factor, jacobian, motion, error, numbers.secondary_share, weight, weights, preferred)
     for a in range(error.shape[0]):
         error[a] *= share
         motion[a] += error[a]
-    if numbers.scaling:
+    if numbers.task_scaling:
         aim = 1.0, 0.0, 0.0
         upper[n] = goal_to_scale(jacobian, motion, weight, weights, preferred, aim, hessian, linear)
     else:

@@ -8,12 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from baselines.policy.parameters import parameter
-from baselines.solvers.quadratic_program.among_bodies import AmongBodiesNumbers, qp_step_among
-from baselines.solvers.quadratic_program.base import QuadraticProgramNumbers, VelocityProgram
+from baselines.solvers.quadratic_program.among_bodies import qp_step_among
+from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
-from baselines.solvers.surroundings import around
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
@@ -27,7 +26,7 @@ def qp_step(model, numbers, seen, memory, answer):
     """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
     q, pull, (qdot, status, iterations) = seen.q, numbers.pull, answer
-    n, size = q.shape[1], q.shape[1] + numbers.scaling
+    n, size = q.shape[1], q.shape[1] + numbers.task_scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     preferred, x = np.empty(n), np.empty(size)
     for row in range(q.shape[0]):
@@ -113,12 +112,3 @@ class QuadraticProgram(VelocityProgram):
             raise InvalidInputError(
                 f"influence: expected a number above the clearance of {self.clearance:g} m, got {self.influence:g}."
             )
-
-    def numbers(self) -> QuadraticProgramNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return self.program_numbers(scaling=self.task_scaling)
-
-    def numbers_among(self) -> AmongBodiesNumbers:
-        """See :meth:`CompiledPolicy.numbers_among`."""
-        program = self.program_numbers(scaling=self.task_scaling)
-        return AmongBodiesNumbers(program, self.clearance, self.influence, self.repulsion, *around(self.problem))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.limits import limits_with_braking
@@ -90,24 +91,6 @@ def scaling(along, base, lower, upper):
     return (most if least <= most else 0.0), critical
 
 
-class SaturationNumbers(NamedTuple):
-    """The parameters of :class:`SaturationInNullSpace` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        damping: See :class:`SaturationInNullSpace`.
-        braking_share: Share of the acceleration limits that the feedback assumes for braking; 0 without limits.
-        reach: Roots of the inverse weights of the joints. Shape (n,).
-        limits: See :func:`limits_with_braking`. Shape (5, n).
-    """
-
-    gain: float
-    damping: float
-    braking_share: float
-    reach: FloatArray
-    limits: FloatArray
-
-
 @kernel
 def sns_step(model, numbers, seen, memory, answer):
     """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
@@ -122,11 +105,11 @@ def sns_step(model, numbers, seen, memory, answer):
         jac *= dt * reach
         lower /= reach
         upper /= reach
-        if numbers.braking_share > 0.0:
+        if numbers.braking > 0.0:
             weight = motion_weight(jac, error[row], numbers.damping, 0.0, equal, limits[FASTEST])
             curvature(jac, weight, equal, hessian)
             if cholesky(hessian):
-                error[row] *= feedback_share(hessian, jac, error[row], numbers.braking_share, limits[CHANGE] / reach)
+                error[row] *= feedback_share(hessian, jac, error[row], numbers.braking, limits[CHANGE] / reach)
         shift[row] += error[row]
         iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
         qdot[row] *= reach
@@ -162,7 +145,12 @@ class SaturationInNullSpace(ResolvedRate):
     damping: float = parameter(3e-5, number, at_least=0.0)
     joint_weights: float | Sequence[float] | None = None
     braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
-    _reach: FloatArray = dataclasses.field(init=False, repr=False)
+    #: See :class:`VelocityProgram`.
+    braking: float = derived()
+    #: Roots of the inverse weights of the joints. Shape (n,).
+    reach: FloatArray = derived()
+    #: See :func:`limits_with_braking`. Shape (5, n).
+    limits: FloatArray = derived()
 
     name: ClassVar[str] = "sns"
     keeps_acceleration: ClassVar[bool] = True
@@ -170,9 +158,7 @@ class SaturationInNullSpace(ResolvedRate):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._settle(_reach=read_only(1.0 / np.sqrt(self.weights_of(self.joint_weights))))
-
-    def numbers(self) -> SaturationNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        share = self.braking_share if np.isfinite(self.problem.model.acceleration_limit).any() else 0.0
-        return SaturationNumbers(self.gain, self.damping, share, self._reach, limits_with_braking(self.problem))
+        brakes = np.isfinite(self.problem.model.acceleration_limit).any()
+        reach = read_only(1.0 / np.sqrt(self.weights_of(self.joint_weights)))
+        braking = self.braking_share if brakes else 0.0
+        self._settle(reach=reach, braking=braking, limits=limits_with_braking(self.problem))

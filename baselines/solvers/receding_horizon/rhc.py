@@ -19,19 +19,15 @@ import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
+from baselines.policy.surroundings import swept
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
-from baselines.solvers.receding_horizon.newton.settings import (
-    PlanNumbers,
-    PlanNumbersAmong,
-    PlanSettings,
-    plain_settings,
-)
-from baselines.solvers.surroundings import around, swept
+from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
-from ikgym.validation import FloatArray, flag, number, whole_number
+from ikgym.validation import BoolArray, FloatArray, IntArray, flag, number, read_only, whole_number
 
 # Range of the kernel's counters and random numbers.
 MOST = 2**31 - 1
@@ -121,7 +117,13 @@ class RecedingHorizon(CompiledPolicy):
 
     #: Steps from now to the knots. Shape (K,).
     offsets: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False)
-    _numbers: PlanNumbers = dataclasses.field(init=False, repr=False)
+    #: Which joints are prismatic. Shape (n,).
+    prismatic: BoolArray = derived()
+    #: The settings in two blocks, see :func:`plain_settings`.
+    reals: FloatArray = derived()
+    integers: IntArray = derived()
+    #: See :class:`newton.bodies.Clearance`; without bodies of no rows. Shape (k, n).
+    sweep: FloatArray = derived()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -139,8 +141,9 @@ class RecedingHorizon(CompiledPolicy):
         given = {name: getattr(self, name) for name in PlanSettings._fields if name in self.parameters}
         given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
         settings = PlanSettings(**given)
-        numbers = PlanNumbers(model.chain.prismatic, *plain_settings(problem.cost.parameters, settings))
-        self._settle(offsets=knots, _numbers=numbers)
+        reals, integers = plain_settings(problem.cost.parameters, settings)
+        sweep = read_only(swept(model) if self.among_bodies else np.empty((0, model.joints)))
+        self._settle(offsets=knots, prismatic=model.chain.prismatic, reals=reals, integers=integers, sweep=sweep)
 
     @property
     def interior_point(self) -> bool:
@@ -167,13 +170,10 @@ class RecedingHorizon(CompiledPolicy):
         """Steps from now to the knots. Shape (K,)."""
         return offsets(self.horizon - 1, self.move_blocks)
 
-    def numbers(self) -> PlanNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return self._numbers
-
-    def numbers_among(self) -> PlanNumbersAmong:
-        """See :meth:`CompiledPolicy.numbers_among`."""
-        return PlanNumbersAmong(self._numbers, self.clearance, swept(self.problem.model), *around(self.problem))
+    @classmethod
+    def kernel_fields(cls) -> tuple[str, ...]:
+        """See :meth:`CompiledPolicy.kernel_fields`; most are in blocks, which are read faster."""
+        return "prismatic", "reals", "integers", "clearance", "sweep"
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.

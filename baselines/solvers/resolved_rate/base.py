@@ -17,7 +17,7 @@ from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.jit import inner, uncounted
+from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.validation import FloatArray, number, per_joint
 
@@ -84,11 +84,6 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
         """A :class:`NominalMemory` without a step before."""
         return NominalMemory(np.zeros((rows, self.problem.task.size)), np.zeros(rows, dtype=np.bool_))
 
-    @property
-    def full_rank(self) -> int:
-        """The rank that the task Jacobian has where nothing is lost: redundant coordinates add none."""
-        return min(self.problem.task.error_size, self.problem.model.joints, 6)
-
 
 def velocity_weights(arm: Arm, fastest: FloatArray, power: float, slow: float = 1.0) -> float | tuple[float, ...]:
     """Weights of the joints by their largest velocities v, (v_max / v)^power; 1 for all where the arm has no limits.
@@ -145,6 +140,12 @@ def task_motion(chain, kind, seen, memory):
             before[row, i] = target[i]
         known[row] = True
     return jacobian, motion, error
+
+
+@inlined
+def full_rank(jacobian):
+    """The rank that task Jacobians (B, e, n) have where nothing is lost: redundant coordinates add none."""
+    return min(jacobian.shape[1], jacobian.shape[2], 6)
 
 
 @uncounted

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,18 +13,6 @@ from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feed
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 from ikgym.validation import number
-
-
-class DampedNumbers(NamedTuple):
-    """The parameters of :class:`DampedLeastSquares` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        damping: λ.
-    """
-
-    gain: float
-    damping: float
 
 
 @inner
@@ -74,7 +62,3 @@ class DampedLeastSquares(ResolvedRate):
 
     name: ClassVar[str] = "dls"
     step = dls_step
-
-    def numbers(self) -> DampedNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return DampedNumbers(self.gain, self.damping)

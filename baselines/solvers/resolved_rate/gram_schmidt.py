@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
-from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
+from baselines.solvers.resolved_rate.base import (
+    ResolvedRate,
+    add_feedback,
+    finish,
+    full_rank,
+    say_deficient,
+    task_motion,
+)
 from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import number
 
@@ -74,27 +81,13 @@ def _take_off(rest, wanted, a, unit, given):
     wanted[a] -= part * given
 
 
-class GramSchmidtNumbers(NamedTuple):
-    """The parameters of :class:`GramSchmidt` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        truncation: Rows whose remainder is shorter than this share of the longest row are left out.
-        full_rank: The rank that J has where nothing is lost.
-    """
-
-    gain: float
-    truncation: float
-    full_rank: int
-
-
 @kernel
 def gram_schmidt_step(model, numbers, seen, memory, answer):
     """One step of :class:`GramSchmidt`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     deficient = np.empty(shift.shape[0], np.bool_)
-    orthonormal_rows(jacobian, shift, numbers.truncation, numbers.full_rank, answer.qdot, deficient)
+    orthonormal_rows(jacobian, shift, numbers.truncation, full_rank(jacobian), answer.qdot, deficient)
     say_deficient(deficient, answer.status)
     finish(model, answer)
 
@@ -131,7 +124,3 @@ class GramSchmidt(ResolvedRate):
 
     name: ClassVar[str] = "gram_schmidt"
     step = gram_schmidt_step
-
-    def numbers(self) -> GramSchmidtNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return GramSchmidtNumbers(self.gain, self.truncation, self.full_rank)

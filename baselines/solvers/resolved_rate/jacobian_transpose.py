@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
@@ -14,6 +15,7 @@ from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,
     finish,
+    full_rank,
     say_deficient,
     task_motion,
 )
@@ -56,31 +58,15 @@ def transpose_rows(jacobian, shift, weights, tolerance, out, stuck):
             dq[k] *= alpha
 
 
-class TransposeNumbers(NamedTuple):
-    """The parameters of :class:`JacobianTranspose` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ counts as zero.
-        full_rank: The rank that J has where nothing is lost.
-        weights: The diagonal of W². Shape (e,).
-    """
-
-    gain: float
-    tolerance: float
-    full_rank: int
-    weights: FloatArray
-
-
 @kernel
 def transpose_step(model, numbers, seen, memory, answer):
     """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     stuck = np.empty(shift.shape[0], np.bool_)
-    transpose_rows(jacobian, shift, numbers.weights, numbers.tolerance, answer.qdot, stuck)
+    transpose_rows(jacobian, shift, numbers.weights, numbers.rank_tolerance, answer.qdot, stuck)
     say_deficient(stuck, answer.status)
-    if shift.shape[1] != numbers.full_rank:
+    if shift.shape[1] != full_rank(jacobian):
         answer.status[:] = APPLIED
     finish(model, answer)
 
@@ -113,8 +99,8 @@ class JacobianTranspose(ResolvedRate):
 
     rank_tolerance: float = parameter(1e-12, number, at_least=0.0)
     length: float | None = parameter(None, number, above=0.0)
-
-    _weights: FloatArray = dataclasses.field(init=False, repr=False)
+    #: The diagonal of W². Shape (e,).
+    weights: FloatArray = derived()
 
     name: ClassVar[str] = "jacobian_transpose"
     step = transpose_step
@@ -122,8 +108,4 @@ class JacobianTranspose(ResolvedRate):
     def __post_init__(self) -> None:
         super().__post_init__()
         length = radian(self.problem.model) if self.length is None else self.length
-        self._settle(length=length, _weights=read_only(error_weights(self.problem.task, length)))
-
-    def numbers(self) -> TransposeNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return TransposeNumbers(self.gain, self.rank_tolerance, self.full_rank, self._weights)
+        self._settle(length=length, weights=read_only(error_weights(self.problem.task, length)))

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
-from baselines.solvers.resolved_rate.base import ResolvedRate, add_feedback, finish, say_deficient, task_motion
+from baselines.solvers.resolved_rate.base import (
+    ResolvedRate,
+    add_feedback,
+    finish,
+    full_rank,
+    say_deficient,
+    task_motion,
+)
 from ikgym.kernels.jit import kernel
 from ikgym.validation import FloatArray, number, read_only
-
-
-class PseudoinverseNumbers(NamedTuple):
-    """The parameters of :class:`MoorePenrose` and its relatives as their kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        tolerance: Singular values below this share of the largest count as zero.
-        full_rank: The rank that J has where nothing is lost.
-        root: By which the columns of J are divided: the roots of the joints' weights. Shape (n,).
-    """
-
-    gain: float
-    tolerance: float
-    full_rank: int
-    root: FloatArray
 
 
 @kernel
@@ -37,7 +30,7 @@ def pseudoinverse_step(model, numbers, seen, memory, answer):
     add_feedback(numbers.gain, error, shift)
     root, qdot = numbers.root, answer.qdot
     deficient = np.empty(qdot.shape[0], np.bool_)
-    pseudoinverse_rows(jacobian / root, shift, numbers.tolerance, numbers.full_rank, qdot, deficient)
+    pseudoinverse_rows(jacobian / root, shift, numbers.tolerance, full_rank(jacobian), qdot, deficient)
     say_deficient(deficient, answer.status)
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
@@ -46,7 +39,28 @@ def pseudoinverse_step(model, numbers, seen, memory, answer):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class MoorePenrose(ResolvedRate):
+class Pseudoinverse(ResolvedRate, abc.ABC):
+    """Base of solvers by the pseudoinverse.
+
+    Args:
+        problem: The scenario as the policy knows it.
+        gain: See :class:`ResolvedRate`.
+    """
+
+    #: Singular values below this fraction of the largest count as zero.
+    tolerance: float = derived()
+    #: Divisors of the columns of J: the roots of the joints' weights. Shape (n,).
+    root: FloatArray = derived()
+
+    step = pseudoinverse_step
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(root=read_only(np.ones(self.problem.model.joints)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MoorePenrose(Pseudoinverse):
     """The smallest joint velocity that makes the task velocity asked for: q̇ = J⁺ ẋ (Varga 2021, eq. 1).
 
     Near a singularity the joint velocities grow without bound. Where the Jacobian has lost rank to working precision
@@ -65,9 +79,7 @@ class MoorePenrose(ResolvedRate):
     rank_tolerance: float = parameter(1e-12, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "moore_penrose"
-    step = pseudoinverse_step
 
-    def numbers(self) -> NamedTuple:
-        """See :meth:`CompiledPolicy.numbers`."""
-        root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, root)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(tolerance=self.rank_tolerance)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
+from baselines.policy.fields import derived
 from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
-from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, say_deficient, task_motion
+from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, full_rank, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
-from baselines.solvers.surroundings import around
 from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
@@ -35,61 +35,20 @@ def task_rows(jacobian, velocity, out):
             out[row, a] = total
 
 
-class NullSpaceNumbers(NamedTuple):
-    """The parameters of :class:`NullSpace` as its kernel takes them.
-
-    Attributes:
-        gain: Share of the present error that is taken back in one step.
-        tolerance: Singular values below this share of the largest count as zero.
-        full_rank: The rank that J has where nothing is lost.
-        damping: λ; 0 for the pseudoinverse.
-        secondary_gain: K Δt.
-        joint_gain: How strongly each joint is led to its goal. Shape (n,).
-        goal: Where the joints are led to, in [rad] or [m]. Shape (n,).
-    """
-
-    gain: float
-    tolerance: float
-    full_rank: int
-    damping: float
-    secondary_gain: float
-    joint_gain: FloatArray
-    goal: FloatArray
-
-
-class AmongBodiesNumbers(NamedTuple):
-    """The parameters of :class:`NullSpace` among bodies as its kernel takes them.
-
-    Attributes:
-        plain: Those without bodies.
-        influence: The distance from which on a pair is looked at, in [m].
-        repulsion: K of the way out, in [1/s].
-        bodies: See :class:`baselines.solvers.surroundings.Around`.
-        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
-    """
-
-    plain: NullSpaceNumbers
-    influence: float
-    repulsion: float
-    bodies: FloatArray
-    boxes: FloatArray
-
-
 @kernel
 def null_space_step_among(model, numbers, seen, memory, answer):
     """One step of :class:`NullSpace` among bodies; see :class:`CompiledPolicy` for the arguments."""
-    plain = numbers.plain
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
-    add_feedback(plain.gain, error, shift)
+    add_feedback(numbers.gain, error, shift)
     q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
     aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
-    objective_rows(plain, q, aim)
+    objective_rows(numbers, model.dt, q, aim)
     work = near_work(q.shape[1], shapes.links.shape[0])
     for row in range(q.shape[0]):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
         count = near_distances(model.chain, *around_it, q[row], numbers.influence, work, distances, reaches, gradients)
         repel(distances, reaches, gradients, count, model.dt * numbers.repulsion, aim[row])
-    aimed_rows(plain, aim, jacobian, shift, answer.qdot, answer.status)
+    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 
 
@@ -99,7 +58,7 @@ def null_space_step(model, numbers, seen, memory, answer):
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     add_feedback(numbers.gain, error, shift)
     aim = np.empty(seen.q.shape)
-    objective_rows(numbers, seen.q, aim)
+    objective_rows(numbers, model.dt, seen.q, aim)
     aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
     finish(model, answer)
 
@@ -109,35 +68,35 @@ def aimed_rows(numbers, aim, jacobian, shift, out, status):
     """J⁺ Δx + (I - J⁺ J) Δt z row by row.
 
     Args:
-        numbers: The :class:`NullSpaceNumbers`.
+        numbers: The fields of :class:`NullSpace`.
         aim: Secondary joint shifts Δt z. Shape (B, n).
         jacobian: Task Jacobians. Shape (B, e, n).
         shift: Task shifts. Shape (B, e).
         out: Receives the joint shifts. Shape (B, n).
         status: Receives values of :class:`Status`. Shape (B,).
     """
-    tolerance, full_rank = numbers.tolerance, numbers.full_rank
+    tolerance, rank = numbers.rank_tolerance, full_rank(jacobian)
     disturbance, deficient = np.empty(shift.shape), np.empty(aim.shape[0], np.bool_)
     task_rows(jacobian, aim, disturbance)
     if numbers.damping == 0.0:  # with one pseudoinverse
-        pseudoinverse_rows(jacobian, shift - disturbance, tolerance, full_rank, out, deficient)
+        pseudoinverse_rows(jacobian, shift - disturbance, tolerance, rank, out, deficient)
         out += aim
         say_deficient(deficient, status)
         return
     taken_off = np.empty(aim.shape)
     damped_rows(jacobian, shift, numbers.damping, out)
-    pseudoinverse_rows(jacobian, disturbance, tolerance, full_rank, taken_off, deficient)
+    pseudoinverse_rows(jacobian, disturbance, tolerance, rank, taken_off, deficient)
     out += aim - taken_off
     status[:] = APPLIED
 
 
 @inner
-def objective_rows(numbers, q, out):
-    """Joint shifts Δt z of the secondary objective, row by row: numbers, (B, n), (B, n)."""
-    joint_gain, goal = numbers.joint_gain, numbers.goal
+def objective_rows(numbers, dt, q, out):
+    """Joint shifts Δt z of the secondary objective, row by row: the fields, Δt in [s], (B, n), (B, n)."""
+    joint_gain, goal, gain = numbers.joint_gain, numbers.goal, dt * numbers.secondary_gain
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
-            out[row, j] = joint_gain[j] * (goal[j] - q[row, j]) * numbers.secondary_gain
+            out[row, j] = joint_gain[j] * (goal[j] - q[row, j]) * gain
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -184,8 +143,10 @@ class NullSpace(MoorePenrose):
     damping: float = parameter(1e-3, number, at_least=0.0)
     influence: float = parameter(0.3, number, above=0.0)
     repulsion: float = parameter(10.0, number, at_least=0.0)
-    _target: FloatArray = dataclasses.field(init=False, repr=False)
-    _joint_gain: FloatArray = dataclasses.field(init=False, repr=False)
+    #: How strongly each joint moves to its goal, relative to K. Shape (n,).
+    joint_gain: FloatArray = derived()
+    #: The joints' goal, in [rad] or [m]. Shape (n,).
+    goal: FloatArray = derived()
 
     name: ClassVar[str] = "null_space"
     step, step_among = null_space_step, null_space_step_among
@@ -202,23 +163,7 @@ class NullSpace(MoorePenrose):
         if self.among_bodies:
             self.check_secondary_gain(self.repulsion, "repulsion")
         self._settle(objective=objective, posture=as_given(given, posture))
-        self._settle(_target=read_only(target), _joint_gain=read_only(gains))
-
-    def numbers(self) -> NullSpaceNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return NullSpaceNumbers(
-            self.gain,
-            self.rank_tolerance,
-            self.full_rank,
-            self.damping,
-            self.problem.dt * self.secondary_gain,
-            self._joint_gain,
-            self._target,
-        )
-
-    def numbers_among(self) -> AmongBodiesNumbers:
-        """See :meth:`CompiledPolicy.numbers_among`."""
-        return AmongBodiesNumbers(self.numbers(), self.influence, self.repulsion, *around(self.problem))
+        self._settle(goal=read_only(target), joint_gain=read_only(gains))
 
 
 def _centre(model: Arm) -> tuple[FloatArray, FloatArray]:

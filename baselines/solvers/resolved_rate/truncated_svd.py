@@ -5,16 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-import numpy as np
-
 from baselines.policy.parameters import parameter
-from baselines.solvers.resolved_rate.base import ResolvedRate
-from baselines.solvers.resolved_rate.moore_penrose import PseudoinverseNumbers, pseudoinverse_step
-from ikgym.validation import number, read_only
+from baselines.solvers.resolved_rate.moore_penrose import Pseudoinverse
+from ikgym.validation import number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class TruncatedSVD(ResolvedRate):
+class TruncatedSVD(Pseudoinverse):
     """The pseudoinverse without the small singular values: Δq = Σ v uᵀ Δx / σ over the large σ (Khan 2020, section 2).
 
     The joint shift is at most ‖Δx‖ / (threshold σ_max). Within the directions that are kept nothing is distorted,
@@ -35,9 +32,7 @@ class TruncatedSVD(ResolvedRate):
     threshold: float = parameter(3e-3, number, at_least=0.0, below=1.0)
 
     name: ClassVar[str] = "truncated_svd"
-    step = pseudoinverse_step
 
-    def numbers(self) -> PseudoinverseNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        root = read_only(np.ones(self.problem.model.joints))
-        return PseudoinverseNumbers(self.gain, self.threshold, self.full_rank, root)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._settle(tolerance=self.threshold)

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from baselines.solvers.resolved_rate.base import check_weights, velocity_weights
-from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose, PseudoinverseNumbers
-from ikgym.validation import FloatArray, as_given, read_only
+from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
+from ikgym.validation import as_given, read_only
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +35,6 @@ class WeightedPseudoinverse(MoorePenrose):
     """
 
     weights: float | Sequence[float] | None = None
-    _root: FloatArray = dataclasses.field(init=False, repr=False)
 
     name: ClassVar[str] = "weighted_pseudoinverse"
 
@@ -44,8 +43,4 @@ class WeightedPseudoinverse(MoorePenrose):
         by_velocity = velocity_weights(self.problem.model, self.problem.largest_qdot, 2.0)
         given = by_velocity if self.weights is None else self.weights
         weights = check_weights("weights", given, self.problem.model.joints)
-        self._settle(weights=as_given(given, weights), _root=read_only(np.sqrt(weights)))
-
-    def numbers(self) -> PseudoinverseNumbers:
-        """See :meth:`CompiledPolicy.numbers`."""
-        return PseudoinverseNumbers(self.gain, self.rank_tolerance, self.full_rank, self._root)
+        self._settle(weights=as_given(given, weights), root=read_only(np.sqrt(weights)))

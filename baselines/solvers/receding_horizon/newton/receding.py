@@ -79,7 +79,7 @@ def plan_step_among(model, numbers, seen, memory, answer):
     shapes, checked = bodies_of(numbers.bodies)
     influence = numbers.clearance + INFLUENCE
     clearance = Clearance(shapes, numbers.boxes, checked, numbers.sweep, numbers.clearance, influence)
-    plan_rows(model, numbers.plan, seen, memory, answer, clearance)
+    plan_rows(model, numbers, seen, memory, answer, clearance)
 
 
 @expanded
@@ -88,7 +88,7 @@ def plan_rows(model, numbers, seen, memory, answer, clearance):
     chain, kind = model.chain, model.kind
     # Read-only, as others have compiled for.
     chain = Chain(chain.offsets, chain.axes, numbers.prismatic, chain.tool, chain.tool_rotation)
-    cost, settings = settings_of(numbers.numbers, numbers.integers)
+    cost, settings = settings_of(numbers.reals, numbers.integers)
     data = ProblemData(chain, kind, cost, model.dt, model.lower, model.upper, model.largest)
     knots, n, plans = settings.at.shape[0], model.unit.shape[0], memory.plans
     limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n

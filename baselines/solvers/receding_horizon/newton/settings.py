@@ -37,38 +37,6 @@ class PlanSettings(NamedTuple):
     change_limit: Floats
 
 
-class PlanNumbers(NamedTuple):
-    """The parameters as the kernel of a step takes them.
-
-    Attributes:
-        prismatic: Which joints are prismatic. Shape (n,).
-        numbers: See :func:`plain_settings`.
-        integers: See :func:`plain_settings`.
-    """
-
-    prismatic: npt.NDArray[np.bool_]
-    numbers: Floats
-    integers: Integers
-
-
-class PlanNumbersAmong(NamedTuple):
-    """The parameters as the kernel of a step among bodies takes them.
-
-    Attributes:
-        plan: Those without bodies.
-        clearance: The distance that is kept at the knots, in [m].
-        sweep: See :class:`bodies.Clearance`. Shape (k, n).
-        bodies: See :class:`baselines.solvers.surroundings.Around`.
-        boxes: Likewise. Shape (B, o, 16) or (1, o, 16).
-    """
-
-    plan: PlanNumbers
-    clearance: float
-    sweep: Floats
-    bodies: Floats
-    boxes: Floats
-
-
 def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
     """The numbers and the whole numbers of cost and settings, each as one read-only block, for :func:`settings_of`.
 

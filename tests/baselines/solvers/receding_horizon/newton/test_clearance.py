@@ -5,13 +5,13 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
+from baselines.policy.surroundings import swept
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance, clearance_workspace
 from baselines.solvers.receding_horizon.newton.clearance import is_clear, keep_clear
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import newton_workspace
-from baselines.solvers.surroundings import swept
 from ikgym.arms.bodies import Bodies
 from ikgym.obstacles import HalfSpace, Sphere
 from tests.baselines.solvers.receding_horizon.newton.states import DT, State, horizon_of, path_problem

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from baselines.policy import Problem
+from baselines.policy.problem import Problem
 from ikgym.arms import Arm
 from ikgym.kernels.bodies import Shapes
 from ikgym.plant.sweep import sweep
 from ikgym.validation import LARGEST, BoolArray, FloatArray
 
 
-class Around(NamedTuple):
-    """Bodies and obstacles, as arrays that a call from Python hands to a kernel.
+def surroundings_of(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """The bodies of a problem, see :func:`bodies_block`, and the obstacles at the start of an episode.
 
-    Attributes:
-        bodies: See :func:`bodies_block`.
-        boxes: The obstacles of each row, or those of all rows. Shape (B, o, 16) or (1, o, 16).
+    There are none where touching does not matter. Shapes (any,), (1, o, 16).
     """
-
-    bodies: FloatArray
-    boxes: FloatArray
-
-
-def around(problem: Problem) -> Around:
-    """The bodies of a problem, and the obstacles as they are at the start; none where touching does not matter."""
     bodies, known = problem.model.bodies, problem.surroundings
     boxes, checked = bodies.surroundings(()) if known is None else known
-    return Around(bodies_block(bodies.shapes, checked), boxes[None].copy())
+    return bodies_block(bodies.shapes, checked), boxes[None].copy()
 
 
 def bodies_block(shapes: Shapes, checked: BoolArray) -> FloatArray:
