@@ -17,7 +17,7 @@ import json
 import multiprocessing
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tyro
@@ -26,8 +26,9 @@ from matplotlib.figure import Figure
 from baselines.evaluation.plots import style
 from baselines.evaluation.table import from_csv, to_csv
 from baselines.files import write
-from baselines.training.methods import BY_REWARDS
-from baselines.training.rewards import ALGORITHMS, SETTINGS, Training, entries, read
+from baselines.training.options import Rewards
+from baselines.training.rewards import train
+from baselines.training.zoo import ALGORITHMS, SETTINGS, entries, read
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -39,6 +40,14 @@ EPISODES = 256
 #: CPU time of a run with the defaults of the library, which know no number of steps, in [min].
 MINUTES = 4.0
 Line = dict[str, Any]
+
+
+class Training(NamedTuple):
+    """One run: its options, seed and folder."""
+
+    config: Rewards
+    seed: int
+    folder: Path
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,8 +74,9 @@ class Command:
         if self.environments is None:
             pairs = [(env, name) for env, name in pairs if env in entries(SETTINGS / f"{name}.yml")]
         for seed, (env, algorithm) in itertools.product(self.seeds, pairs):
+            config = Rewards(algorithm=algorithm, env=env, minutes=minutes, defaults=self.defaults)
             folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
-            out.append(Training(BY_REWARDS[algorithm](env=env, minutes=minutes, defaults=self.defaults), seed, folder))
+            out.append(Training(config, seed, folder))
         return out
 
 
@@ -75,15 +85,15 @@ def about(training: Training) -> Line:
     config = training.config
     digest = hashlib.sha256(json.dumps(read(config), sort_keys=True).encode()).hexdigest()[:8]
     kind = "defaults" if config.defaults else "published"
-    return dict(zip(RUN, (config.env, config.method, kind, digest, str(training.seed)), strict=True))
+    return dict(zip(RUN, (config.env, config.algorithm, kind, digest, str(training.seed)), strict=True))
 
 
 def curve(training: Training) -> list[Line]:
     """Trains, and gives the lines of the curve; the last one has the test."""
-    training.run()
-    with (training.out / "curve.csv").open(encoding="utf-8", newline="") as stream:
+    train(*training)
+    with (training.folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
         lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in csv.DictReader(stream)]
-    model = ALGORITHMS[training.config.method].load(training.out / "model.zip", device="cpu")
+    model = ALGORITHMS[training.config.algorithm].load(training.folder / "model.zip", device="cpu")
     cost = rl.costs(model, training.config.env, split="test", episodes=EPISODES)
     lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
     return lines

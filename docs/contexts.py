@@ -21,7 +21,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import lost
 from baselines.files import write_json
 from baselines.statistics import geometric_interval, geometric_mean
-from baselines.training.config import PPO, RecurrentPPO
+from baselines.training.options import Rewards
 from docs.keeping import RUNS, Line, lines, resumable
 from ikgym.rl import Task, scoring
 from ikgym.validation import BoolArray, FloatArray
@@ -53,9 +53,9 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
 #: Learners by their names: published settings, and what is observed.
 USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
 LEARNERS = {
-    "ppo_shown": (PPO(env="ikgym/Track-v0"), USUAL.replace(context=True)),
-    "ppo_history": (PPO(env="ikgym/Track-v0"), USUAL.replace(history=4)),
-    "ppo_recurrent": (RecurrentPPO(env="ikgym/Camera-v0"), USUAL),
+    "ppo_shown": (Rewards(env="ikgym/Track-v0"), USUAL.replace(context=True)),
+    "ppo_history": (Rewards(env="ikgym/Track-v0"), USUAL.replace(history=4)),
+    "ppo_recurrent": (Rewards(algorithm="recurrent_ppo", env="ikgym/Camera-v0"), USUAL),
 }
 #: Costs of episodes, and whether the arm was lost, by split. Shapes (s, e), one row a training seed.
 Played = Mapping[str, tuple[FloatArray, BoolArray]]
@@ -112,10 +112,10 @@ def _solver(name: str) -> Played:
 
 def _learner(name: str, files: Sequence[Path]) -> Played:
     """The models of a learner on the first episodes of each split."""
-    from baselines.training.rewards import ALGORITHMS
+    from baselines.training.zoo import ALGORITHMS
 
     learner, task = LEARNERS[name]
-    models, out = [ALGORITHMS[learner.method].load(file, device="cpu") for file in files], {}
+    models, out = [ALGORITHMS[learner.algorithm].load(file, device="cpu") for file in files], {}
     for split, (scenario, seeds) in SPLITS.items():
         found = [play(model, task, scenario, ikgym.scenarios.seeds(seeds, EPISODES)) for model in models]
         out[split] = np.array([costs for costs, _ in found]), np.array([away for _, away in found])
@@ -135,7 +135,7 @@ def train(name: str, seed: int, steps: int) -> None:
     """Trains a learner, unless it is there, and writes `model.zip` and `run.json`."""
     import torch
 
-    from baselines.training import rewards
+    from baselines.training import rewards, zoo
     from ikgym.sb3 import LearningVecEnv
 
     folder = RUNS / f"context-{name}" / f"seed-{seed}"
@@ -144,8 +144,8 @@ def train(name: str, seed: int, steps: int) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     learner, task = LEARNERS[name]
-    settings = rewards.read(learner)
-    model = rewards.built(rewards.ALGORITHMS[learner.method], LearningVecEnv(settings["n_envs"], task), settings, seed)
+    settings = zoo.read(learner)
+    model = rewards.make(learner.algorithm, LearningVecEnv(settings["n_envs"], task), settings, seed)
     begin = time.process_time()
     model.learn(steps)
     minutes = round((time.process_time() - begin) / 60.0, 1)

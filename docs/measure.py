@@ -128,18 +128,20 @@ def policies(line: Line) -> list[str]:
 
 def untrained() -> None:
     """Writes agents as they are before their training: of apg, and of PPO and SAC in `ikgym/Track-v0`."""
-    from baselines.training import rewards
-    from baselines.training.exporting import exported
-    from baselines.training.methods import BY_REWARDS, configure
-    from baselines.training.trainer import Trainer
+    import ikgym.sb3
+    from baselines.training import rewards, zoo
+    from baselines.training.apg import Trainer
+    from baselines.training.exporting import agent_of_model
+    from baselines.training.options import APG, Rewards
 
-    def by_rewards(method: str, seed: int) -> AgentFile:
-        config = BY_REWARDS[method](env="ikgym/Track-v0")
-        model: Any = rewards.make(config, rewards.read(config), seed)
-        return exported(model, model.get_env())
+    def by_rewards(algorithm: str, seed: int) -> AgentFile:
+        config = Rewards(algorithm=algorithm, env="ikgym/Track-v0")
+        settings = zoo.read(config)
+        envs = ikgym.sb3.make_vec(config.env, settings["n_envs"])
+        return agent_of_model(rewards.make(algorithm, envs, settings, seed), envs)
 
     def by_gradients(seed: int) -> AgentFile:
-        config = configure("standard")
+        config = APG.preset("standard")
         return Trainer(config, config.make_scenario(), seed).agent()
 
     makers: dict[str, Callable[[int], AgentFile]] = {

@@ -3,7 +3,8 @@
 import pytest
 
 from baselines.evaluation.table import from_csv, to_csv
-from baselines.training.rewards import Training, read
+from baselines.training.options import Rewards
+from baselines.training.zoo import read
 from benchmarks import learning
 from ikgym import rl
 from ikgym.exceptions import UnknownNameError
@@ -15,7 +16,7 @@ PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
 def test_curves_are_of_the_published_settings(tmp_path):
     runs = {tuple(line[name] for name in learning.RUN) for line in PUBLISHED}
     for env, algorithm, _, _, seed in runs:
-        training = Training(learning.BY_REWARDS[algorithm](env=env), int(seed), tmp_path)
+        training = learning.Training(Rewards(algorithm=algorithm, env=env), int(seed), tmp_path)
         assert tuple(learning.about(training).values()) in runs
 
 
@@ -37,7 +38,7 @@ def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
 
 def test_algorithms_are_trained_where_settings_are_published():
     trainings = learning.Command(algorithms=("ppo", "recurrent_ppo"), seeds=(0, 1)).trainings()
-    pairs = [(one.config.env, one.config.method, one.seed) for one in trainings]
+    pairs = [(one.config.env, one.config.algorithm, one.seed) for one in trainings]
     recurrent = [(env, "recurrent_ppo") for env in ("ikgym/Camera-v0", "ikgym/Payload-v0")]
     assert set(pairs) == {(*one, seed) for one in [*((env, "ppo") for env in rl.IDS), *recurrent] for seed in (0, 1)}
     [other] = learning.Command(("recurrent_ppo",), ("ikgym/Track-v0",), seeds=(0,)).trainings()
@@ -48,7 +49,7 @@ def test_algorithms_are_trained_where_settings_are_published():
 def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
     small = tmp_path / "curves.csv"
     monkeypatch.setattr(learning, "EPISODES", 2)
-    training = Training(learning.BY_REWARDS["ppo"](env="ikgym/Track-v0", total_timesteps=2048, episodes=2), 0, tmp_path)
+    training = learning.Training(Rewards(env="ikgym/Track-v0", total_timesteps=2048, episodes=2), 0, tmp_path)
     lines = learning.curve(training)
     small.write_text(to_csv(lines), encoding="utf-8")
     assert from_csv(small.read_text(encoding="utf-8"))[-1]["test_log_cost"]

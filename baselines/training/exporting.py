@@ -59,10 +59,10 @@ def export(
         InvalidInputError: The model is another, or the environment shows more than agents see.
         ResultsError: The file cannot be written.
     """
-    return save_agent(pathlib.Path(file), exported(model, envs, training))
+    return save_agent(pathlib.Path(file), agent_of_model(model, envs, training))
 
 
-def exported(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, Any] | None = None) -> AgentFile:
+def agent_of_model(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping[str, Any] | None = None) -> AgentFile:
     """A model as an agent in memory; see :func:`export`.
 
     Raises:
@@ -113,6 +113,6 @@ def _check_actions(model: BaseAlgorithm, network: Network) -> None:
         InvalidInputError: They differ: there is more to the model than its layers.
     """
     features = np.random.default_rng(0).uniform(-1.0, 1.0, (_COMPARED, network.sizes[0])).astype(np.float32)
-    found, _ = model.predict(features, deterministic=True)
-    if not np.abs(found - network.forward(features)).max() <= _NEAR:
+    actions, _ = model.predict(features, deterministic=True)
+    if not np.abs(actions - network.forward(features)).max() <= _NEAR:
         raise InvalidInputError("model: its actions are not those of its layers; a custom features extractor?")

@@ -1,13 +1,25 @@
-"""One run: the training of one agent with one seed, in one folder, which can be killed at any moment and resumed."""
+"""Runs of apg: each in one folder, killed at any moment and resumed.
+
+| file | content |
+|---|---|
+| `run.json` | options, seed, versions, machine, a row for each segment, and in the end the hash of the final weights |
+| `checkpoint.pt` | the state to resume from, behind its SHA-256 |
+| `events.out.tfevents.apg` | the rows, for TensorBoard |
+| `agent.safetensors` | in the end: the agent, a policy of :mod:`baselines` |
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import io
 import math
 import pathlib
 import platform
+import sys
 import time
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -15,31 +27,45 @@ import numba
 import numpy as np
 import stable_baselines3
 import torch
+from tensorboard.compat.proto.event_pb2 import Event
+from tensorboard.compat.proto.summary_pb2 import Summary
+from tensorboard.summary.writer.record_writer import RecordWriter
 from torch import nn
-from torch.utils.tensorboard import SummaryWriter
+from tqdm import tqdm
 
 import ikgym
-from baselines.agents.files import save_agent
-from baselines.evaluation.metrics import describe
-from baselines.files import locked, write_json
+from baselines.agents.files import AgentFile, save_agent
+from baselines.agents.policy import Agent
+from baselines.episodes import rollouts
+from baselines.evaluation.metrics import describe, lost
+from baselines.files import check_flags, locked, read_bytes, reading, reason, resumed, write, write_json
 from baselines.fingerprints import fingerprint
-from baselines.training.config import APG, TrainingError
-from baselines.training.folder import FORMAT, Checkpoint, Folder
-from baselines.training.randomness import deterministic_torch, reseed
-from baselines.training.trainer import SegmentMetrics, Trainer
-from baselines.training.validation import Score, bound, validated
+from baselines.oracle import best_known
+from baselines.policy import Problem
+from baselines.policy.protocol import Policy
+from baselines.recording import add_up
+from baselines.statistics import geometric_mean
+from baselines.training.apg import Trainer
+from baselines.training.options import APG, TrainingError
+from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
+from ikgym import scenarios
+from ikgym.exceptions import IkgymError
+from ikgym.scenarios import Scenario
 
+#: The version of `run.json` and of `checkpoint.pt`.
+FORMAT = 4
+RUN, CHECKPOINT, AGENT, EVENTS = "run.json", "checkpoint.pt", "agent.safetensors", "events.out.tfevents.apg"
 #: Weights above this have diverged.
 LARGEST = 1e9
 
-#: Called after each segment with the number of segments done, and the score if there was a validation.
-OnSegment = Callable[[int, Score | None], object]
+#: Called after each segment with the number of segments done, and the cost if there was a validation.
+OnSegment = Callable[[int, float | None], object]
 
 
 def train(
     config: APG,
     seed: int,
-    path: pathlib.Path,
+    folder: pathlib.Path,
     *,
     resume: bool = False,
     overwrite: bool = False,
@@ -47,12 +73,12 @@ def train(
     command: str = "baselines.training.run.train(…)",
     on_segment: OnSegment | None = None,
 ) -> dict[str, Any]:
-    """Trains an agent; returns the content of `run.json`.
+    """Trains an agent; returns the content of `run.json`. PyTorch uses one thread from then on.
 
     Args:
         config: The options.
         seed: Determines all randomness.
-        path: The folder of the run, see :mod:`baselines.training.folder`.
+        folder: The folder of the run.
         resume: Whether to continue the run in the folder, if there is one.
         overwrite: Whether to replace the run in the folder.
         checkpoint_every: Shortest time between two checkpoints, in [s].
@@ -62,72 +88,81 @@ def train(
     Raises:
         IkgymError: Training, validation or a file failed.
     """
-    with locked(path), deterministic_torch():
-        run = _Run(config, seed, Folder(path), command)
+    torch.set_num_threads(1)
+    with locked(folder):
+        run = _Run(config, seed, folder, command)
         run.begin(resume=resume, overwrite=overwrite)
-        return run.go(checkpoint_every, on_segment)
+        run.learn(checkpoint_every, on_segment)
+        return run.finish()
 
 
 class _Run:
-    def __init__(self, config: APG, seed: int, folder: Folder, command: str) -> None:
-        self._config, self._seed, self._folder = config, seed, folder
-        self._scenario = config.make_scenario()
-        self._at = Checkpoint()
-        self._clock, self._core = time.monotonic(), time.process_time()
-        self._about: dict[str, Any] = {
+    def __init__(self, config: APG, seed: int, folder: pathlib.Path, command: str) -> None:
+        self._config, self._folder, self._scenario = config, folder, config.make_scenario()
+        scenario = {name: getattr(self._scenario, name) for name in ("name", "steps")}
+        self._identity = {
             "format": FORMAT,
-            "method": config.method,
+            "method": "apg",
             "seed": seed,
-            "status": "running",
-            "command": command,
             "config": config.to_json(),
-            "scenario": {
-                "name": self._scenario.name,
-                "steps": self._scenario.steps,
-                "fingerprint": fingerprint(self._scenario),
-            },
+            "scenario": {**scenario, "fingerprint": fingerprint(self._scenario)},
             "versions": versions(),
-            "machine": describe(),
         }
+        self._about = {**self._identity, "status": "running", "command": command, "machine": describe()}
+        self._trainer = Trainer(config, self._scenario, seed)
+        self._segments, self._history, self._best = 0, list[dict[str, Any]](), dict[str, Any]()
+        self._core_seconds, self._clock = 0.0, time.process_time()
 
     def begin(self, *, resume: bool, overwrite: bool) -> None:
-        identity = {part: self._about[part] for part in ("method", "seed", "config", "scenario", "versions")}
-        reseed(self._seed, None)
-        self._trainer = Trainer(self._config, self._scenario, self._seed)
-        bound(self._trainer.agent(), self._scenario)  # whatever is refused, is refused before files are replaced
-        there = self._folder.prepare(identity, resume=resume, overwrite=overwrite)
-        if there is not None:
+        """Prepares the folder, and restores the state of the run to resume, if there is one."""
+        policy_of(self._trainer.agent(), self._scenario)  # what is refused is refused before files are replaced
+        manifest, checkpoint = self._folder / RUN, self._folder / CHECKPOINT
+        there = resumed(manifest, self._identity, resume=resume, overwrite=overwrite)
+        if there is None:
+            clear(self._folder)
+        else:
             self._about["command"] = there.get("command", self._about["command"])
-            if self._folder.checkpoint.exists():
-                self._at = Checkpoint.load(self._folder.checkpoint)
-                if self._at.trainer is not None:
-                    self._trainer.restore(self._at.trainer)
-        write_json(self._folder.run, self._content())
+        for draft in self._folder.glob(".*.tmp"):  # of a run that was killed while writing
+            draft.unlink(missing_ok=True)
+        if there is not None and checkpoint.exists():
+            state = load_checkpoint(checkpoint)
+            self._trainer.restore(state["trainer"])
+            self._segments, self._history, self._best = state["segments"], state["history"], state["best"]
+            self._core_seconds = state["core_seconds"]
+        write_json(manifest, self._content())
 
-    def go(self, checkpoint_every: float, on_segment: OnSegment | None) -> dict[str, Any]:
-        # A killed run may have logged rows after its last checkpoint, which are purged.
-        purge = self._trainer.steps + 1 if self._at.history else None
-        with SummaryWriter(str(self._folder.tensorboard), purge_step=purge) as board:
-            if not self._at.history:
-                self._note(0, {}, board)
-            saved = -math.inf
-            while self._at.segments < self._config.segments:
-                number = self._at.segments
-                reseed(self._seed, number)
-                metrics = self._segment(number)
-                self._at.segments = number + 1
-                score = self._note(number + 1, metrics, board)
-                if self._at.segments == self._config.segments or time.monotonic() - saved >= checkpoint_every:
-                    self._save()
-                    saved = time.monotonic()
-                if on_segment is not None:
-                    on_segment(self._at.segments, score)
-        return self._finish()
+    def learn(self, checkpoint_every: float, on_segment: OnSegment | None) -> None:
+        """Trains the segments that are left."""
+        if not self._history:
+            self._note({})
+        saved = -math.inf
+        while self._segments < self._config.segments:
+            metrics = self._segment()
+            self._segments += 1
+            cost = self._note(metrics)
+            if self._segments == self._config.segments or time.monotonic() - saved >= checkpoint_every:
+                self._save()
+                saved = time.monotonic()
+            if on_segment is not None:
+                on_segment(self._segments, cost)
 
-    def _segment(self, number: int) -> SegmentMetrics:
+    def finish(self) -> dict[str, Any]:
+        """Writes the agent with the least cost, and the result of the run, which it returns."""
+        policy = self._trainer.policy
+        self._about |= {"status": "finished", "weights_sha256": weights_hash(policy)}
+        policy.load_state_dict(self._best.pop("policy"))
+        self._about["kept"] = {**self._best, "weights_sha256": weights_hash(policy)}
+        content = self._content()
+        training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
+        save_agent(self._folder / AGENT, self._trainer.agent(training))
+        write(self._folder / EVENTS, events(self._history))
+        write_json(self._folder / RUN, content)
+        return content
+
+    def _segment(self) -> dict[str, float]:
         """A segment of the trainer, with a clear message if its weights diverge."""
         try:
-            metrics = self._trainer.segment(number)
+            metrics = self._trainer.segment(self._segments)
         except (ValueError, RuntimeError):
             if _finite(self._trainer.policy):
                 raise
@@ -135,72 +170,121 @@ class _Run:
             if _finite(self._trainer.policy):
                 return metrics
         raise TrainingError(
-            f"The weights diverged in segment {number + 1}: try a lower learning rate, or another seed."
+            f"The weights diverged in segment {self._segments + 1}: try a lower learning rate, or another seed."
         )
 
-    def _note(self, done: int, metrics: SegmentMetrics, board: SummaryWriter) -> Score | None:
-        """Adds a row to the history, with a score if a validation is due, and with the computing time so far."""
-        config, trainer = self._config, self._trainer
-        row: dict[str, Any] = {"segment": done, "steps": trainer.steps}
-        row.update({name: value for name, value in metrics.items() if math.isfinite(value)})
-        score = None
+    def _note(self, metrics: Mapping[str, float]) -> float | None:
+        """Adds a row to the history, with a score if a validation is due; returns the cost in it."""
+        config, trainer, done, score = self._config, self._trainer, self._segments, dict[str, float]()
         if done % config.evaluate_every == 0 or done == config.segments:
-            score = validated(bound(trainer.agent(), self._scenario), self._scenario, config.validation_episodes)
-            row["validation"] = vars(score)
-            if self._at.best is None or score.cost < self._at.best["score"]["cost"]:
+            policy = policy_of(trainer.agent(), self._scenario)
+            score = validate(policy, self._scenario, config.validation_episodes)
+            if not self._best or score["cost"] < self._best["cost"]:
                 weights = {name: tensor.clone() for name, tensor in trainer.policy.state_dict().items()}
-                self._at.best = {"segment": done, "score": vars(score), "policy": weights}
-        for name, value in [*row.items(), *(vars(score) if score else {}).items()]:
-            if isinstance(value, float):
-                board.add_scalar(name if "/" in name else f"validation/{name}", value, trainer.steps)
-        clock, core = time.monotonic(), time.process_time()
-        self._at.wall_seconds += clock - self._clock
-        self._at.core_seconds += core - self._core
-        self._clock, self._core = clock, core
-        row["core_minutes"] = self._at.core_seconds / 60.0
-        self._at.history.append(row)
-        return score
+                self._best = {"segment": done, **score, "policy": weights}
+        now = time.process_time()
+        self._core_seconds, self._clock = self._core_seconds + now - self._clock, now
+        numbers = {name: value for name, value in metrics.items() if math.isfinite(value)}
+        numbers |= {f"validation/{name}": value for name, value in score.items()}
+        effort = {"segment": done, "steps": trainer.steps, "core_minutes": self._core_seconds / 60.0}
+        self._history.append({**effort, **numbers})
+        return score.get("cost")
 
     def _save(self) -> None:
-        self._at.trainer = self._trainer.state()
-        self._at.save(self._folder.checkpoint)
-        write_json(self._folder.history, self._at.history)
-        write_json(self._folder.run, self._content())
-
-    def _finish(self) -> dict[str, Any]:
-        """Writes the agent and the result of the run."""
-        policy, best = self._trainer.policy, self._at.best
-        assert best is not None  # the untrained agent is validated at the latest
-        self._about["status"] = "finished"
-        self._about["weights_sha256"] = weights_hash(policy)
-        policy.load_state_dict(best["policy"])
-        kept = {"segment": best["segment"], "by": "validation", "weights_sha256": weights_hash(policy)}
-        self._about["kept"] = {**kept, "validation": best["score"]}
-        content = self._content()
-        training = {name: content[name] for name in ("method", "seed", "training", "kept", "versions")}
-        save_agent(self._folder.agent, self._trainer.agent(training))
-        # A run that was killed after its last checkpoint and before its history lacks the last row.
-        write_json(self._folder.history, self._at.history)
-        write_json(self._folder.run, content)
-        return content
+        state = {"segments": self._segments, "history": self._history, "best": self._best}
+        state |= {"trainer": self._trainer.state(), "core_seconds": self._core_seconds}
+        save_checkpoint(self._folder / CHECKPOINT, state)
+        write(self._folder / EVENTS, events(self._history))
+        write_json(self._folder / RUN, self._content())
 
     def _content(self) -> dict[str, Any]:
         """The content of `run.json`."""
-        times = ("segment", "steps", "core_minutes")
-        return {
-            **self._about,
-            "training": {
-                "segments": self._at.segments,
-                "steps": self._trainer.steps,
-                "core_minutes": self._at.core_seconds / 60.0,
-                "wall_minutes": self._at.wall_seconds / 60.0,
-            },
-            "validation": [
-                {name: row[name] for name in times} | row["validation"]
-                for row in self._at.history
-                if "validation" in row
-            ],
-        }
+        effort = {"segments": self._segments, "steps": self._trainer.steps, "core_minutes": self._core_seconds / 60.0}
+        return {**self._about, "training": effort, "history": self._history}
+
+
+def validate(policy: Policy, scenario: Scenario, episodes: int) -> dict[str, float]:
+    """Plays episodes of the split "validation", used neither for training nor for publication.
+
+    Args:
+        policy: The policy.
+        scenario: The scenario; a deterministic one has one episode.
+        episodes: Their number.
+
+    Returns:
+        `cost`, the geometric mean of the costs; `cost_ratio` likewise, left out where a best known cost is missing;
+        `worst`, the largest ratio, or cost where there are none; `lost`, the share of episodes in which the arm lost
+        track; `position_error_max_mm` and `orientation_error_max_mrad`, means of the largest errors of the episodes.
+    """
+    seeds = scenarios.seeds("validation", episodes if scenario.random or scenario.plant.random else 1)
+    played = rollouts(scenario, policy, seeds)
+    costs, known = np.array([add_up(episode.cost) for episode in played]), best_known.costs(scenario, seeds)
+    score = {"cost": geometric_mean(costs)}
+    if None not in known:
+        costs /= np.array(known, dtype=np.float64)
+        score["cost_ratio"] = geometric_mean(costs)
+    errors = [float(episode.position_error.max()) for episode in played]
+    angles = [float(np.nan_to_num(episode.orientation_error).max()) for episode in played]
+    score |= {"worst": float(costs.max()), "lost": float(np.mean(list(map(lost, errors, angles))))}
+    score["position_error_max_mm"] = 1e3 * float(np.mean(errors))
+    if scenario.task.has_orientation:
+        score["orientation_error_max_mrad"] = 1e3 * float(np.mean(angles))
+    return score
+
+
+def policy_of(agent: AgentFile, scenario: Scenario) -> Agent:
+    """An agent as a policy for a scenario.
+
+    Raises:
+        IkgymError: The scenario does not fit the agent.
+    """
+    return Agent(Problem.of(scenario), given=agent)
+
+
+def clear(folder: pathlib.Path) -> None:
+    """Removes the files of a run, but no others."""
+    # run.json first: without it, a folder after a kill is no run.
+    for name in (RUN, CHECKPOINT, AGENT, EVENTS):
+        (folder / name).unlink(missing_ok=True)
+
+
+def events(history: Sequence[Mapping[str, float]]) -> bytes:
+    """A file of TensorBoard with the rows of a history; its time is CPU time."""
+    stream = io.BytesIO()
+    writer = RecordWriter(stream)
+    writer.write(Event(file_version="brain.Event:2").SerializeToString())
+    for row in history:
+        values = [Summary.Value(tag=name, simple_value=row[name]) for name in row if "/" in name]
+        event = Event(wall_time=60.0 * row["core_minutes"], step=int(row["steps"]), summary=Summary(value=values))
+        writer.write(event.SerializeToString())
+    return stream.getvalue()
+
+
+def save_checkpoint(file: pathlib.Path, state: Mapping[str, Any]) -> None:
+    """Writes a state in one go, behind its SHA-256.
+
+    Raises:
+        ResultsError: The file cannot be written.
+    """
+    stream = io.BytesIO()
+    torch.save({"format": FORMAT, **state}, stream)
+    write(file, hashlib.sha256(stream.getvalue()).digest() + stream.getvalue())
+
+
+def load_checkpoint(file: pathlib.Path) -> dict[str, Any]:
+    """The state in a file.
+
+    Raises:
+        ResultsError: It cannot be read, is damaged, or has another format.
+    """
+    with reading(file, "Begin anew with --overwrite."):
+        content = read_bytes(file)
+        if hashlib.sha256(content[32:]).digest() != content[:32]:
+            raise ValueError("its SHA-256 is another")
+        state: dict[str, Any] = torch.load(io.BytesIO(content[32:]), map_location="cpu", weights_only=True)
+        if state["format"] != FORMAT:
+            raise ValueError("it has another format")
+        return state
 
 
 def versions() -> dict[str, str]:
@@ -222,3 +306,93 @@ def weights_hash(policy: nn.Module) -> str:
 def _finite(policy: nn.Module) -> bool:
     """Whether no weight has diverged."""
     return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in policy.parameters())
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Job:
+    """The training of one seed, in any process.
+
+    Args:
+        config: The options.
+        seed: The seed.
+        folder: Its folder.
+        options: Further arguments of :func:`train`.
+        line: The line of the progress bar below the cursor; None for no bar.
+        remote: Whether a node of a cluster does it.
+    """
+
+    config: APG
+    seed: int
+    folder: pathlib.Path
+    options: Mapping[str, Any]
+    line: int | None = None
+    remote: bool = False
+
+
+def train_seeds(jobs: Sequence[Job], workers: Workers = ALONE) -> dict[int, dict[str, Any] | str]:
+    """Trains one agent a seed; returns the `run.json` of each seed, or why it failed.
+
+    One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others. On
+    a cluster all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
+    checkpoint.
+
+    Raises:
+        ClusterError: There is no cluster.
+        ResultsError: On a cluster: a run exists, and is neither resumed nor overwritten.
+    """
+    remote = workers.cluster is not None
+    if remote:
+        jobs = [_prepare(job) for job in jobs]
+    elif len(jobs) == 1:
+        return {jobs[0].seed: train_seed(jobs[0])}
+    results: dict[int, dict[str, Any] | str] = dict.fromkeys((job.seed for job in jobs), "")
+    # On one machine a second attempt would fail again.
+    for job, future in finished(train_seed, jobs, workers, tries=TRIES if remote else 1):
+        try:
+            results[job.seed] = future.result()
+        except WorkerError as e:
+            results[job.seed] = f"{e} Continue with --resume."
+        except Exception as e:  # an error of the program does not end the other seeds
+            traceback.print_exc()
+            results[job.seed] = f"{type(e).__name__}: {reason(e)}"
+    return results
+
+
+def _prepare(job: Job) -> Job:
+    """The job for nodes of a cluster, which resume; its folder is cleared here, or kept."""
+    resume, overwrite = job.options["resume"], job.options["overwrite"]
+    check_flags(job.folder / RUN, resume=resume, overwrite=overwrite)
+    with locked(job.folder):
+        if not resume:
+            clear(job.folder)
+    options = {**job.options, "resume": True, "overwrite": False}
+    return dataclasses.replace(job, folder=job.folder.absolute(), options=options, line=None, remote=True)
+
+
+def train_seed(job: Job) -> dict[str, Any] | str:
+    """Trains the agent of a seed; returns its `run.json`, or why it failed."""
+    if job.remote and not job.folder.exists():
+        return f"{platform.node()} does not see {job.folder}: expected a folder that all nodes of the cluster share"
+    bar = tqdm(
+        total=job.config.segments,
+        desc=f"seed {job.seed}",
+        disable=job.line is None,
+        position=job.line,
+        file=sys.stderr,
+        unit="segment",
+        dynamic_ncols=True,
+        mininterval=0.1 if sys.stderr.isatty() else 10.0,
+    )
+
+    def show(done: int, cost: float | None) -> None:
+        if cost is not None:
+            bar.set_description(f"seed {job.seed}: cost {cost:.4g}", refresh=False)
+        bar.update(done - bar.n)
+
+    try:
+        with bar:
+            return train(job.config, job.seed, job.folder, on_segment=show, **job.options)
+    except IkgymError as e:
+        return " ".join(str(e).split())
+    except MemoryError as e:
+        return f"Out of memory: {reason(e)}. Choose fewer arms (--n-envs) or a smaller network (--hidden)."

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from baselines import cli
-from baselines.training.methods import METHODS
+from baselines.training.options import METHODS
 from docs.terminal import manual_of
 
 _PARTS = "arms obstacles tasks trajectories trajectories.paths scenarios problems kernels.rotations exceptions sb3"

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from baselines.agents.files import load_agent
 from baselines.evaluation.results import read_rows
 from baselines.solvers.rivals.model_files import urdf
-from baselines.training.methods import configure
+from baselines.training.options import APG
 from baselines.tuning import ranges
 from ikgym import arms, scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
@@ -44,7 +44,7 @@ TIMELESS = b"x,y,z\n1,2,3\n4,5.5,6\n7,8,9e-1\n"
 #: Functions that read a file of a user, by the endings of the files.
 READERS = {
     "scenario.toml": scenarios.load,
-    "preset.toml": lambda file: configure(str(file)),
+    "preset.toml": lambda file: APG.preset(str(file)),
     "ranges.toml": ranges.read,
     "points.csv": from_csv,
     "arm.urdf": arms.from_urdf,

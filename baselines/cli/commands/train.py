@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib.util
-import inspect
 import itertools
 import pathlib
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Generic, TypeVar, Union
+from typing import Annotated, Any, Union
 
 import tyro
 
@@ -19,24 +18,31 @@ from baselines.cli import shell
 from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
 from baselines.files import check_writable, locked
-from baselines.training import methods
-from baselines.training.config import APG, Rewards, TrainingError
-from baselines.training.folder import read_run
-from baselines.training.seeds import RunOptions, train_seeds
+from baselines.training.options import APG, METHODS, Rewards, TrainingError, preset_names
 from baselines.workers import Workers
 from ikgym import rl, scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import known_name, whole_number
+from ikgym.validation import known_name, number, whole_number
 
 PROGRAM = "train.py"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options(RunOptions):
-    """Options that do not change the result of a seed."""
+class Options:
+    """Options of runs that do not change their results."""
 
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
     """One run each."""
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
+    """Folder for the files; the run with seed N has the folder seed-N in it."""
+    resume: bool = False
+    """Continue the runs in the folder; they end with the same weights as without the interruption."""
+    overwrite: bool = False
+    """Replace the runs in the folder."""
+    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
+    """Shortest time between two checkpoints; there are none within a segment."""
+    progress: bool = True
+    """Show a progress bar."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Processes that train in parallel, one seed each."""
     cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
@@ -53,16 +59,13 @@ class Command:
     options: Annotated[Options, tyro.conf.arg(name="")]
 
 
-C = TypeVar("C", bound=Rewards)
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ByRewards(Generic[C]):
+class ByRewards:
     """A training by rewards."""
 
-    config: Annotated[C, tyro.conf.arg(name="")]
+    config: Annotated[Rewards, tyro.conf.arg(name="")]
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
-    """One run each, one after the other; the same command goes on with those that have not ended."""
+    """One run each, one after the other; the same command continues with those that have not ended."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder of the runs; that with seed N has the folder seed-N in it."""
 
@@ -89,11 +92,11 @@ Trains agents: networks from observations to joint velocities. apg differentiate
 scenario; ppo, sac and td3 are those of Stable-Baselines3 and recurrent_ppo is that of sb3-contrib, unmodified, in an
 environment by id. Each method has its own options: {prog} METHOD --help
 
-{shell.listing("Methods", methods.METHODS)}
+{shell.listing("Methods", METHODS)}
 
 {shell.listing("Environments by id", rl.IDS)}
 
-{shell.listing("Presets of apg", methods.preset_names())}
+{shell.listing("Presets of apg", preset_names())}
 
 {shell.listing("Scenarios of apg", scenarios.names())}
 
@@ -111,9 +114,8 @@ Files of a run by rewards, all but apg, in seed-N:
   run.json           at the end: settings, seed and final score
 
 Files of a run of apg, which may be killed at any time:
-  run.json           command, seed, versions, validations, computing time, hash of the final weights
-  history.json       a row for each segment
-  tensorboard/       the same, for: tensorboard --logdir DIR
+  run.json           command, seed, versions, a row for each segment, hash of the final weights
+  events.out.…       the rows, for: tensorboard --logdir DIR
   checkpoint.pt      the state, for --resume
   agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE
 
@@ -128,7 +130,9 @@ def main(arguments: Sequence[str]) -> int:
     def work() -> int:
         nonlocal stopped
         command = parse(arguments)
-        _require_extra()
+        for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard"):
+            if importlib.util.find_spec(name) is None:
+                raise ModuleNotFoundError(name=name)
         with shell.escaped_output():
             if isinstance(command, ByRewards):
                 return _train_by_rewards(command)
@@ -142,37 +146,30 @@ def _program() -> str:
     return shell.program("train", f"python {PROGRAM}")
 
 
-def _require_extra() -> None:
-    """Checks for the packages that only training needs."""
-    for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard"):
-        if importlib.util.find_spec(name) is None:
-            raise ModuleNotFoundError(name=name)
-
-
-def parse(arguments: Sequence[str]) -> Command | ByRewards[Any]:
+def parse(arguments: Sequence[str]) -> Command | ByRewards:
     """The command in a command line; without any words they are ``--help``."""
     given = list(arguments) or ["--help"]
-    if given[0] not in ("-h", "--help"):
-        known_name("method", given[0], methods.METHODS)
-        if given[0] != APG.method and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in given}:
-            raise InvalidInputError(f"{given[0]} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
-    preset = _value_of("--preset", given) if given[0] == APG.method else None
-    kinds = [_subcommand(kind, preset) for kind in methods.METHODS.values()]
+    method = given[0]
+    if method not in ("-h", "--help"):
+        known_name("method", method, METHODS)
+        if method != "apg" and not {"-h", "--help", "--env"} & {word.partition("=")[0] for word in given}:
+            raise InvalidInputError(f"{method} needs an environment: expected --env, one of {', '.join(rl.IDS)}.")
+    preset = _value_of("--preset", given) if method == "apg" else None
+    kinds = [_subcommand(name, preset) for name in METHODS]
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command | ByRewards[Any] = parse_options(
-        any_of_them, given, prog=_program(), description=manual(), rules=RULES
-    )
+    command: Command | ByRewards = parse_options(any_of_them, given, prog=_program(), description=manual(), rules=RULES)
+    if isinstance(command, ByRewards):
+        return dataclasses.replace(command, config=command.config.replace(algorithm=method))
     return command
 
 
-def _subcommand(kind: type[APG | Rewards], preset: str | None) -> Any:
+def _subcommand(method: str, preset: str | None) -> Any:
     """The command of a method; options of apg that are left out are those of the preset."""
-    about = (inspect.getdoc(kind) or "").partition("\n\nRaises:")[0]
-    if kind is APG:
-        default: Any = Command(methods.configure(preset), Options(out=tyro.MISSING))
-        return Annotated[Command, tyro.conf.subcommand(kind.method, default=default, description=about)]
-    generic: Any = ByRewards
-    return Annotated[generic[kind], tyro.conf.subcommand(kind.method, description=about)]
+    about = METHODS[method]
+    if method == "apg":
+        default: Any = Command(APG.preset(preset), Options(out=tyro.MISSING))
+        return Annotated[Command, tyro.conf.subcommand(method, default=default, description=about)]
+    return Annotated[ByRewards, tyro.conf.subcommand(method, description=about)]
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str | None:
@@ -184,53 +181,60 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     return None
 
 
-def _train_by_rewards(command: ByRewards[Any]) -> int:
-    from baselines.training.rewards import Training  # imports PyTorch, an extra
+def _train_by_rewards(command: ByRewards) -> int:
+    from baselines.training import rewards  # imports PyTorch, an extra
 
-    seeds = _checked_seeds(command.seeds)
-    trainings = [Training(command.config, seed, command.out / f"seed-{seed}") for seed in seeds]
+    runs = {seed: command.out / f"seed-{seed}" for seed in _checked_seeds(command.seeds)}
     with contextlib.ExitStack() as locks:  # all before the first training, which takes hours
-        for training in trainings:
-            locks.enter_context(locked(training.out))
-            check_writable(training.out)
-        for training in trainings:
-            there = training.finished()
-            about = there or training.run()
-            done = f"score {about['validation_score']:.3f} after {about['steps']} steps"
-            print(f"seed {training.seed}: {done}{', already there' if there else ''}", flush=True)
+        for folder in runs.values():
+            locks.enter_context(locked(folder))
+            check_writable(folder)
+        for seed, folder in runs.items():
+            there = rewards.finished(command.config, seed, folder)
+            about = there or rewards.train(command.config, seed, folder)
+            score = f"score {about['validation_score']:.3f} after {about['steps']} steps"
+            print(f"seed {seed}: {score}{', already there' if there else ''}", flush=True)
     print(f"\nwritten to {command.out}")
     return 0
 
 
 def _train(command: Command, text: str) -> int:
-    options = command.options
+    from baselines.training.run import Job, train_seeds  # imports PyTorch, an extra
+
+    options, jobs = command.options, list[Job]()
     workers = Workers(options.workers, options.cluster)
-    errors = train_seeds(command.config, options, _checked_seeds(options.seeds), workers=workers, command=text)
-    print(table(errors, options))
+    names = ("resume", "overwrite", "checkpoint_every")
+    given = {name: getattr(options, name) for name in names} | {"command": text}
+    number("checkpoint_every", options.checkpoint_every, at_least=0.0)
+    for line, seed in enumerate(_checked_seeds(options.seeds)):
+        folder, bar = options.out / f"seed-{seed}", line if options.progress else None
+        jobs.append(Job(config=command.config, seed=seed, folder=folder, options=given, line=bar))
+    results = train_seeds(jobs, workers)
+    print(table(results))
+    errors = {seed: result for seed, result in results.items() if isinstance(result, str)}
     for seed, error in errors.items():
-        if error:
-            print(f"error: seed {seed}: {error}", file=sys.stderr)
-    if not all(errors.values()):
+        print(f"error: seed {seed}: {error}", file=sys.stderr)
+    if len(errors) < len(results):
         print(f"\nwritten to {options.out}")
-    return 2 if any(errors.values()) else 0
+    return 2 if errors else 0
 
 
 def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
-    """The seeds without those given twice."""
+    """The seeds without repetitions."""
     checked = tuple(dict.fromkeys(whole_number("seeds", seed, at_least=0) for seed in seeds))
     if not checked:
         raise TrainingError("seeds: expected at least one.")
     return checked
 
 
-def table(errors: Mapping[int, str], options: RunOptions) -> str:
-    """A table of seeds and their scores, from the files of their runs."""
+def table(results: Mapping[int, Mapping[str, Any] | str]) -> str:
+    """A table of seeds and their scores, from the `run.json` of each."""
     lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
-    for seed, error in errors.items():
-        if error:
+    for seed, result in results.items():
+        if isinstance(result, str):
             lines.append(f"{seed:>4}  failed")
             continue
-        score = read_run(options.folder(seed) / "run.json")["kept"]["validation"]
-        ratio = "–" if score["cost_ratio"] is None else f"{score['cost_ratio']:.4f}"
+        score = result["kept"]
+        ratio = f"{score['cost_ratio']:.4f}" if "cost_ratio" in score else "–"
         lines.append(f"{seed:>4}  {ratio:>8}  {score['cost']:>10.5g}  {score['worst']:>8.4g}  {score['lost']:>6.1%}")
     return "\n".join(lines)

@@ -112,16 +112,16 @@ class Arms:
         self._put(rows, np.where(self._follows[rows], self.made[rows], 0))
 
     def state(self) -> dict[str, Any]:
-        """The state of all arms and episodes."""
-        numbers = {name: torch.from_numpy(getattr(self, name).copy()) for name in ("seed", "made", "spent", "played")}
-        return {"q": self.q.detach().clone(), "qdot": self.qdot.detach().clone(), **numbers}
+        """The state of all arms and episodes, to be saved."""
+        numbers = {name: torch.from_numpy(getattr(self, name)) for name in ("seed", "made", "spent", "played")}
+        return {"q": self.q.detach(), "qdot": self.qdot.detach(), **numbers}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continues from a :meth:`state`."""
+        """Continues from a :meth:`state` that was saved."""
         self._load(np.arange(len(self.seed)), state["seed"].numpy())
-        self.q, self.qdot = state["q"].clone(), state["qdot"].clone()
+        self.q, self.qdot = state["q"], state["qdot"]
         for name in ("made", "spent", "played"):
-            setattr(self, name, state[name].numpy().copy())
+            setattr(self, name, state[name].numpy())
 
     @property
     def _follows(self) -> npt.NDArray[np.bool_]:

@@ -4,9 +4,8 @@ import json
 import pathlib
 from typing import Any
 
-from baselines.training.config import APG
-from baselines.training.randomness import reseed
-from baselines.training.trainer import Trainer
+from baselines.training.apg import Trainer
+from baselines.training.options import APG
 
 #: Options that make a run short.
 TINY: dict[str, Any] = {
@@ -31,17 +30,7 @@ def tiny(**changes: Any) -> APG:
 
 def trainer_of(config: APG, seed: int = 1) -> Trainer:
     """The trainer of a configuration, before its first segment."""
-    reseed(seed, None)
     return Trainer(config, config.make_scenario(), seed)
-
-
-def play_segments(trainer: Trainer, numbers: Any, seed: int = 1) -> list[dict[str, float]]:
-    """The metrics of some segments."""
-    metrics = []
-    for number in numbers:
-        reseed(seed, number)
-        metrics.append(trainer.segment(number))
-    return metrics
 
 
 def about(folder: pathlib.Path) -> dict[str, Any]:
@@ -52,5 +41,5 @@ def about(folder: pathlib.Path) -> dict[str, Any]:
 
 def timeless(folder: pathlib.Path) -> list[dict[str, Any]]:
     """The history of a run, without times."""
-    rows = json.loads((folder / "history.json").read_text(encoding="utf-8"))
+    rows = about(folder)["history"]
     return [{name: value for name, value in row.items() if name != "core_minutes"} for row in rows]

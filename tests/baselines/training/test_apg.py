@@ -6,22 +6,15 @@ import torch
 
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.files import load_agent, save_agent
-from baselines.training.config import TrainingError
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.randomness import deterministic_torch
-from baselines.training.validation import bound, validated
+from baselines.training.options import TrainingError
+from baselines.training.run import policy_of, validate
 from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError
-from tests.baselines.training.small import play_segments, tiny, trainer_of
+from tests.baselines.training.small import tiny, trainer_of
 
 CONFIG = tiny()
-
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    with deterministic_torch():
-        yield
 
 
 def test_gradient_of_a_window_is_that_of_its_loss():
@@ -94,15 +87,15 @@ def test_it_learns():
     short = {"steps": 60, "segments": 4, "segment_steps": 240, "window": (16, 48)}
     config = CONFIG.replace(hidden=(32, 32), n_envs=32, averaging=0.9, damping=100.0, **short)
     trainer, scenario = trainer_of(config), config.make_scenario()
-    before = validated(bound(trainer.agent(), scenario), scenario, 8).cost
-    losses = [metrics["train/loss"] for metrics in play_segments(trainer, range(4))]
-    assert validated(bound(trainer.agent(), scenario), scenario, 8).cost < 2e-2 * before
+    before = validate(policy_of(trainer.agent(), scenario), scenario, 8)["cost"]
+    losses = [metrics["train/loss"] for metrics in map(trainer.segment, range(4))]
+    assert validate(policy_of(trainer.agent(), scenario), scenario, 8)["cost"] < 2e-2 * before
     assert losses[-1] < losses[0]
 
 
 def test_runs_begin_from_an_agent(tmp_path):
     trained = trainer_of(CONFIG)
-    play_segments(trained, [0])
+    trained.segment(0)
     save_agent(tmp_path / "a.safetensors", trained.agent())
     begun = trainer_of(CONFIG.replace(init=tmp_path / "a.safetensors"), seed=5)
     wanted = load_agent(tmp_path / "a.safetensors").network
@@ -137,7 +130,7 @@ def test_the_agent_is_the_average_of_the_actor():
     trainer = trainer_of(CONFIG.replace(segments=5, averaging=0.7, segment_steps=16, window=(16,)))
     mean = [weights.detach().clone() for weights in trainer.policy.parameters()]
     for number in range(5):
-        play_segments(trainer, [number])
+        trainer.segment(number)
         kept = min(0.7, (1 + number) / (10 + number))
         mean = [kept * old + (1 - kept) * new for old, new in zip(mean, trainer._actor.parameters(), strict=True)]
         for wanted, given in zip(mean, trainer.policy.parameters(), strict=True):
@@ -148,7 +141,7 @@ def test_the_agent_is_the_average_of_the_actor():
 def test_other_arms_and_tasks(name):
     """Limits, a prismatic joint 1, points that are held, and references without a joint path."""
     trainer = trainer_of(CONFIG.replace(scenario=name, segments=1))
-    (metrics,) = play_segments(trainer, [0])
+    metrics = trainer.segment(0)
     assert metrics["train/refused"] == 0.0
     assert np.isfinite(metrics["train/loss"])
 

@@ -1,5 +1,6 @@
 """The command line of training: exit codes, several seeds, repetition."""
 
+import dataclasses
 import importlib.util
 import pathlib
 import subprocess
@@ -7,12 +8,11 @@ import sys
 
 import pytest
 
-from baselines.cli.commands import train
 from baselines.cli.commands.train import main, parse
 from baselines.files import ResultsError
-from baselines.training import run, seeds
-from baselines.training.config import APG
-from baselines.training.seeds import RunOptions, Seed
+from baselines.training import run
+from baselines.training.options import APG
+from baselines.training.run import Job
 from baselines.workers import Workers
 from tests.baselines.losing import LosingCluster
 from tests.baselines.training.small import about, timeless, tiny
@@ -24,6 +24,11 @@ TINY = [
     "--segments", "2", "--n-envs", "4", "--window", "16", "--segment-steps", "48", "--validation-episodes", "1",
     "--no-progress",
 ]  # fmt: skip
+
+
+def job_of(config, out, seed=1, *, overwrite=False):
+    options = {"resume": False, "overwrite": overwrite}
+    return Job(config=config, seed=seed, folder=out / f"seed-{seed}", options=options)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +55,7 @@ def test_several_seeds(alone, tmp_path, capsys, monkeypatch):
 @pytest.mark.slow
 def test_a_seed_that_fails_does_not_end_the_others(alone, tmp_path, monkeypatch, capfd):
     """Processes of this machine."""
-    monkeypatch.setattr(seeds, "train_seed", dies_with_seed_7)
+    monkeypatch.setattr(run, "train_seed", dies_with_seed_7)
     assert main(["apg", *TINY, "--seeds", "7", "1", "--workers", "1", "--out", str(tmp_path)]) == 2
     assert about(tmp_path / "seed-1")["weights_sha256"] == about(alone / "seed-1")["weights_sha256"]
     printed = capfd.readouterr()
@@ -61,9 +66,10 @@ def test_a_seed_that_fails_does_not_end_the_others(alone, tmp_path, monkeypatch,
 
 def test_an_error_of_the_program_is_said_and_ends_no_other_seed(tmp_path, monkeypatch, capfd):
     LosingCluster(monkeypatch)
-    monkeypatch.setattr(seeds, "train_seed", lambda job: 1 // (job.seed - 3) * "")
-    errors = seeds.train_seeds(APG(), RunOptions(out=tmp_path), [3, 4], workers=Workers(cluster="ray"))
-    assert errors == {3: "ZeroDivisionError: integer division or modulo by zero", 4: ""}
+    monkeypatch.setattr(run, "train_seed", lambda job: {"seed": 1 // (job.seed - 3)})
+    jobs = [job_of(APG(), tmp_path, seed) for seed in (3, 4)]
+    results = run.train_seeds(jobs, Workers(cluster="ray"))
+    assert results == {3: "ZeroDivisionError: integer division or modulo by zero", 4: {"seed": 1}}
     assert "Traceback" in capfd.readouterr().err
 
 
@@ -100,7 +106,7 @@ def test_no_method(capsys):
     ("patched", "error", "code", "message"),
     [
         ((run, "train"), MemoryError("Unable to allocate 9 TiB"), 2, "Out of memory: Unable to allocate 9 TiB. Choose"),
-        ((train, "train_seeds"), KeyboardInterrupt(), 130, "continue with --resume"),
+        ((run, "train_seeds"), KeyboardInterrupt(), 130, "continue with --resume"),
     ],
 )
 def test_a_run_that_ends_early(patched, error, code, message, tmp_path, monkeypatch, capsys):
@@ -138,11 +144,12 @@ def test_the_command_line_takes_precedence_over_the_preset(tmp_path):
 
 
 def test_nodes_of_a_cluster_share_the_folder(tmp_path):
-    config, options = tiny(segments=1), RunOptions(out=tmp_path, overwrite=True, progress=False)
-    elsewhere = Seed(config, RunOptions(out=tmp_path / "unseen"), "", 1, remote=True)
-    assert "expected a folder that all nodes of the cluster share" in seeds.train_seed(elsewhere)
-    assert not seeds.train_seed(Seed(config, seeds._shared(options, [1]), "", 1, remote=True))
+    config = tiny(segments=1)
+    elsewhere = dataclasses.replace(job_of(config, tmp_path / "unseen"), remote=True)
+    assert "expected a folder that all nodes of the cluster share" in run.train_seed(elsewhere)
+    job = job_of(config, tmp_path, overwrite=True)
+    assert run.train_seed(run._prepare(job))["status"] == "finished"
     with pytest.raises(ResultsError, match="already exists"):
-        seeds._shared(RunOptions(out=tmp_path), [1])
-    seeds._shared(options, [1])
-    assert not (tmp_path / "seed-1" / "run.json").exists()
+        run._prepare(job_of(config, tmp_path))
+    run._prepare(job)
+    assert not (job.folder / "run.json").exists()

@@ -10,7 +10,7 @@ import ikgym.sb3
 from baselines.agents.policy import Agent
 from baselines.agents.track import Track
 from baselines.policy import Problem
-from baselines.training.exporting import export, exported
+from baselines.training.exporting import agent_of_model, export
 from ikgym import rl
 from ikgym.exceptions import InvalidInputError
 
@@ -64,7 +64,7 @@ def test_large_actions_are_clipped_or_squashed_alike(name):
     model = model_of(kind, envs, **options)
     last = {"ppo": lambda: model.policy.action_net, "sac": lambda: model.actor.mu, "td3": lambda: model.actor.mu[-2]}
     last[name]().weight.data.mul_(100.0)
-    policy = Agent(Problem.of(envs.scenario), given=exported(model, envs))
+    policy = Agent(Problem.of(envs.scenario), given=agent_of_model(model, envs))
     assert compare(model, policy, rl.IDS[TRACK].arms(3, lost_distance=None), "learning-track", 10) > 50
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import errno
+import inspect
 import json
 import tempfile
 
@@ -17,10 +19,12 @@ from stable_baselines3.common.noise import NormalActionNoise
 import baselines
 from baselines.cli.commands.train import main
 from baselines.files import locked
-from baselines.training.methods import METHODS
-from baselines.training.rewards import ALGORITHMS, Training, make, read
-from ikgym import rl
+from baselines.training.options import Rewards
+from baselines.training.rewards import make, train
+from baselines.training.zoo import ALGORITHMS, OTHERS, arguments, read
+from ikgym import files, rl
 from ikgym.exceptions import IkgymError
+from ikgym.sb3 import make_vec
 
 TRACK = "ikgym/Track-v0"
 NET = "dict(net_arch=[8, 8])"
@@ -43,7 +47,11 @@ def settings(tmp_path, request):
 
 
 def options(algorithm, **changes):
-    return METHODS[algorithm](**{"env": TRACK, "validations": 1, "episodes": 2, **changes})
+    return Rewards(algorithm=algorithm, **{"env": TRACK, "validations": 1, "episodes": 2, **changes})
+
+
+def model_of(algorithm, settings, env=TRACK):
+    return make(algorithm, make_vec(env, settings.get("n_envs", 1)), settings)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -53,13 +61,13 @@ def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
         config = options(algorithm, env=env)
         found = read(config)
         assert found["n_timesteps"] > 0
-        assert make(config, {**found, **small}).gamma == found["gamma"]
+        assert model_of(algorithm, {**found, **small}, env).gamma == found["gamma"]
 
 
 def test_settings_are_read_as_rl_zoo3_reads_them():
     kwargs = "dict(net_arch=dict(pi=[8], vf=[9]), activation_fn=nn.ReLU, log_std_init=-1.5)"
     settings = {"n_steps": 8, "batch_size": 8, "learning_rate": "lin_0.004", "clip_range": "lin_0.2"}
-    model = make(options("ppo"), {**settings, "policy_kwargs": kwargs})
+    model = model_of("ppo", {**settings, "policy_kwargs": kwargs})
     assert model.policy_kwargs == {
         "net_arch": {"pi": [8], "vf": [9]},
         "activation_fn": torch.nn.ReLU,
@@ -73,7 +81,7 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
     file = tmp_path / "long.yml"
     entry = "{n_timesteps: 10000000, n_steps: 16, batch_size: 16, learning_rate: lin_0.001}"
     file.write_text(f"{TRACK}: {entry}\n", encoding="utf-8")
-    about = Training(options("ppo", minutes=0.002, settings=file), 0, tmp_path / "run").run()
+    about = train(options("ppo", minutes=0.002, settings=file), 0, tmp_path / "run")
     assert 0 < about["steps"] < 10_000_000
     rate = PPO.load(tmp_path / "run" / "model.zip").policy.optimizer.param_groups[0]["lr"]
     assert 0.0009 < rate <= 0.001
@@ -89,13 +97,13 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
     {"policy_kwargs": "dict(a=1).pop('a')"},
 ])  # fmt: skip
 def test_other_texts_are_refused(setting):
-    with pytest.raises(IkgymError, match=r"settings: expected|There is no activation|Unknown activation"):
-        make(options("ppo"), {"n_steps": 8, "batch_size": 8, **setting})
+    with pytest.raises(IkgymError, match=r"expected a number, or lin_|settings: expected|There is no activation"):
+        model_of("ppo", {"n_steps": 8, "batch_size": 8, **setting})
 
 
 @pytest.mark.parametrize(("settings", "algorithm"), [(one, one) for one in SMALL], indirect=["settings"])
 def test_the_first_updates_are_those_of_plain_calls(settings, algorithm, tmp_path):
-    Training(options(algorithm, settings=settings), 3, tmp_path / "run").run()
+    train(options(algorithm, settings=settings), 3, tmp_path / "run")
     kind = {"ppo": PPO, "sac": SAC, "td3": TD3, "recurrent_ppo": RecurrentPPO}[algorithm]
     policy, lstm = ("MlpLstmPolicy", {"lstm_hidden_size": 8}) if algorithm == "recurrent_ppo" else ("MlpPolicy", {})
     plain = {
@@ -145,7 +153,7 @@ def test_the_command_writes_model_agent_curve_and_score_and_goes_on_where_it_was
 
 @pytest.mark.parametrize("settings", ["recurrent_ppo"], indirect=True)
 def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
-    about = Training(options("recurrent_ppo", settings=settings), 0, tmp_path / "run").run()
+    about = train(options("recurrent_ppo", settings=settings), 0, tmp_path / "run")
     assert about["agent"] == "none: model: expected one without memory, as agents in files are, got an LSTM."
     assert not (tmp_path / "run" / "agent.safetensors").exists()
     model = RecurrentPPO.load(tmp_path / "run" / "model.zip", device="cpu")
@@ -160,7 +168,7 @@ def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
 
 
 def test_the_defaults_of_the_library_are_those_of_its_policy_with_memory():
-    model = make(options("recurrent_ppo", defaults=True), {"n_timesteps": 64})
+    model = model_of("recurrent_ppo", {"n_timesteps": 64})
     assert (model.n_envs, model.n_steps, model.policy.lstm_hidden_state_shape) == (1, 128, (1, 1, 256))
 
 
@@ -170,7 +178,7 @@ def test_the_defaults_of_the_library_are_those_of_its_policy_with_memory():
     (["pp", "--env", TRACK], "Did you mean 'ppo'"),
     (["ppo"], "expected --env, one of ikgym/Reach-v0, ikgym/Track-v0,"),
     (["ppo", "--env", "ikgym/Fast-v0", "--settings", "FILE"], "ikgym/Track-v0"),
-    (["ppo", "--env", TRACK, "--settings", "FILE"], "ppo refuses"),
+    (["ppo", "--env", TRACK, "--settings", "FILE"], "There is no setting of ppo 'learning_starts'. Did you mean"),
     (["ppo", "--env", TRACK, "--settings", "FILE", "--defaults"], "no effect with --defaults"),
     (["ppo", "--env", TRACK, "--settings", "missing.yml"], "Cannot read missing.yml"),
     (["ppo", "--env", TRACK, "--minutes", "0"], "minutes: expected a finite number above 0"),
@@ -204,27 +212,95 @@ def test_other_files_of_settings_are_refused(content, message, tmp_path):
         read(options("ppo", settings=tmp_path / "mine.yml"))
 
 
-@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
-@pytest.mark.parametrize(("setting", "message"), [
-    ("gamma: -1", "gamma: expected a finite number from 0 to 1, got -1.0."),
-    ("clip_range: -1", "clip_range: expected a finite number above 0, got -1.0."),
-    ("clip_range: lin_-1", "clip_range in the format of rl-zoo3"),
-    ("clip_range: [1]", "clip_range: expected a finite number above 0, got [1]."),
-    ("n_epochs: few", "n_epochs: expected a whole number of at least 1, got 'few'."),
-    ("n_steps: 1.5", "n_steps: expected a whole number of at least 1, got 1.5."),
-    ("ent_coef: []", "settings: ppo refuses"),  # from within `learn`
-    ("policy_kwargs: [[[[1]]]]", "settings: ppo refuses"),
+@pytest.mark.parametrize(("algorithm", "setting", "message"), [
+    ("ppo", {"gamma": -1}, "gamma: expected a finite number from 0 to 1, got -1.0."),
+    ("ppo", {"clip_range": -1}, "clip_range: expected a finite number above 0, got -1.0."),
+    ("ppo", {"clip_range": "lin_-1"}, "clip_range: expected a number, or lin_ and one above 0, got 'lin_-1'."),
+    ("ppo", {"clip_range": [1]}, r"clip_range: expected a finite number above 0, got \[1\]."),
+    ("ppo", {"n_epochs": "few"}, "n_epochs: expected a whole number of at least 1, got 'few'."),
+    ("ppo", {"n_steps": 1.5}, "n_steps: expected a whole number of at least 1, got 1.5."),
+    ("ppo", {"ent_coef": []}, "ent_coef: expected a finite number of at least 0"),
+    ("ppo", {"ent_coef": -0.1}, "ent_coef: expected a finite number of at least 0, got -0.1."),
+    ("ppo", {"ent_coef": "auto"}, "ent_coef: expected a finite number of at least 0, got 'auto'."),
+    ("ppo", {"target_kl": 0}, "target_kl: expected a finite number above 0, got 0.0."),
+    ("ppo", {"vf_coef": -1}, "vf_coef: expected a finite number of at least 0, got -1.0."),
+    ("ppo", {"max_grad_norm": 0}, "max_grad_norm: expected a finite number above 0, got 0.0."),
+    ("ppo", {"use_sde": "yes"}, "use_sde: expected true or false, got 'yes'."),
+    ("ppo", {"normalize_advantage": 1}, "normalize_advantage: expected true or false, got 1."),
+    ("ppo", {"sde_sample_freq": 4}, "sde_sample_freq has no effect without use_sde."),
+    ("ppo", {"tensorboard_log": "logs"}, "no setting of ppo 'tensorboard_log'. Available: learning_rate, "),
+    ("ppo", {"device": "cuda"}, "no setting of ppo 'device'"),
+    ("ppo", {"normalize": True}, "no setting of ppo 'normalize'. Did you mean 'normalize_advantage'"),
+    ("ppo", {"noise_type": "normal", "noise_std": 0.1}, "no setting of ppo 'noise_type'"),
+    ("ppo", {"policy": "MlpPolic"}, "no policy 'MlpPolic'. Did you mean 'MlpPolicy'"),
+    ("ppo", {"policy_kwargs": [[[[1]]]]}, "policy_kwargs: expected a table, got"),
+    ("ppo", {"policy_kwargs": {"net_arc": [8]}}, "no key of policy_kwargs 'net_arc'. Did you mean 'net_arch'"),
+    ("ppo", {"policy_kwargs": {"net_arch": [8, 0]}}, "net_arch: expected a whole number of at least 1, got 0."),
+    ("ppo", {"policy_kwargs": {"net_arch": {"critic": [8]}}}, "no network in net_arch 'critic'. Available: pi, vf, qf"),
+    ("ppo", {"policy_kwargs": {"ortho_init": "no"}}, "ortho_init: expected true or false, got 'no'."),
+    ("ppo", {"policy_kwargs": {"activation_fn": "nn.ReLU"}}, "settings: ppo refuses"),
+    ("sac", {"ent_coef": "auto_-1"}, "ent_coef: expected a number, or auto_ and one above 0, got 'auto_-1'."),
+    ("sac", {"ent_coef": "low"}, "ent_coef: expected a finite number of at least 0, got 'low'."),
+    ("sac", {"target_entropy": "high"}, "target_entropy: expected a finite number, got 'high'."),
+    ("sac", {"tau": 0}, "tau: expected a finite number above 0 and of at most 1, got 0.0."),
+    ("sac", {"gradient_steps": 0}, "gradient_steps: expected -1 or a whole number of at least 1, got 0."),
+    ("sac", {"train_freq": [1, "day"]}, "no unit of train_freq 'day'. Available: step, episode"),
+    ("sac", {"train_freq": 0}, "train_freq: expected a whole number of at least 1, got 0."),
+    ("sac", {"learning_starts": -1}, "learning_starts: expected a whole number of at least 0, got -1."),
+    ("sac", {"buffer_size": "1e5"}, "buffer_size: expected a whole number of at least 1, got '1e5'."),
+    ("sac", {"replay_buffer_kwargs": 3}, "replay_buffer_kwargs: expected a table, got 3."),
+    ("td3", {"target_policy_noise": -0.1}, "target_policy_noise: expected a finite number of at least 0, got -0.1."),
+    ("td3", {"noise_type": "ornstein-uhlenbeck"}, "no noise_type 'ornstein-uhlenbeck'. Available: normal"),
+    ("td3", {"noise_std": 0.1}, "There is no noise_type None. Available: normal"),
+    ("td3", {"noise_type": "normal", "noise_std": -1}, "noise_std: expected a finite number of at least 0, got -1.0."),
 ])  # fmt: skip
-def test_errors_of_the_library_are_one_line(setting, message, settings, tmp_path, capsys):
-    key = setting.partition(":")[0]
-    entry = [part for part in settings.read_text(encoding="utf-8").strip().rstrip("}").split(", ") if key not in part]
-    entry = [part for part in entry if not (key == "policy_kwargs" and part.startswith("8]"))]
-    settings.write_text(", ".join([*entry, f"{setting}}}"]), encoding="utf-8")
+def test_settings_that_mean_nothing_are_refused_before_the_training(algorithm, setting, message):
+    with pytest.raises(IkgymError, match=message):
+        model_of(algorithm, setting)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_the_defaults_of_an_algorithm_are_settings(algorithm):
+    """So that each of its parameters passes its check, and none is forgotten."""
+    kind = ALGORITHMS[algorithm]
+    defaults = {name: one.default for name, one in inspect.signature(kind).parameters.items() if name not in OTHERS}
+    of_noise = {"sde_sample_freq", "use_sde_at_warmup"}
+    expected = {name: value for name, value in defaults.items() if name not in of_noise}
+    assert len(expected) > 10
+    assert arguments(algorithm, expected, 7).items() >= expected.items()
+    sde = {name: value for name, value in defaults.items() if name in of_noise}
+    if sde:
+        assert arguments(algorithm, {**sde, "use_sde": True}, 7).items() >= sde.items()
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_errors_of_the_library_are_one_line(settings, tmp_path, capsys):
+    text = settings.read_text(encoding="utf-8").replace("n_steps: 16", "n_steps: 16, batch_size: 1")
+    settings.write_text(text.replace(", batch_size: 16", ""), encoding="utf-8")
     words = ["ppo", "--env", TRACK, "--settings", str(settings), "--episodes", "2", "--out", str(tmp_path / "runs")]
     assert main(words) == 2
     error = capsys.readouterr().err
-    assert message in error
+    assert "settings: ppo refuses" in error
     assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_a_full_disk_ends_a_run_with_a_message_and_the_command_begins_it_again(settings, tmp_path, capsys, monkeypatch):
+    write = files.write
+
+    def write_if_there_is_space(file, content):
+        if file.name == "model.zip":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(file, content)
+
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--episodes", "2", "--out", str(tmp_path)]
+    with monkeypatch.context() as patched:
+        patched.setattr(files, "write", write_if_there_is_space)
+        assert main(words) == 2
+    file = tmp_path / "seed-0" / "model.zip"
+    assert capsys.readouterr().err == f"error: Cannot write {file}: No space left on device.\n"
+    assert not (tmp_path / "seed-0" / "run.json").exists()
+    assert main(words) == 0
 
 
 @pytest.mark.parametrize("settings", ["ppo"], indirect=True)

@@ -1,6 +1,6 @@
 """Runs of apg: a segment depends on state and number alone, runs are resumed, replaced and refused."""
 
-import io
+import errno
 import multiprocessing
 import signal
 import time
@@ -14,12 +14,10 @@ import baselines
 from baselines.episodes import rollouts
 from baselines.files import ResultsError
 from baselines.training import run as run_module
-from baselines.training.config import TrainingError
-from baselines.training.folder import FORMAT, sealed
-from baselines.training.randomness import deterministic_torch
-from baselines.training.run import train, weights_hash
-from baselines.training.validation import validation_seeds
-from tests.baselines.training.small import about, play_segments, timeless, tiny, trainer_of
+from baselines.training.options import TrainingError
+from baselines.training.run import FORMAT, save_checkpoint, train, weights_hash
+from ikgym import files, scenarios
+from tests.baselines.training.small import about, timeless, tiny, trainer_of
 
 CONFIG = tiny()
 #: Processes begin at once: their server has loaded all that a run needs.
@@ -35,15 +33,14 @@ CASES = {
 
 @pytest.mark.parametrize("config", CASES.values(), ids=CASES)
 def test_a_segment_depends_on_state_and_number(config, tmp_path):
-    with deterministic_torch():
-        undisturbed = trainer_of(config)
-        before = weights_hash(undisturbed.policy)
-        play_segments(undisturbed, [0])
-        torch.save(undisturbed.state(), tmp_path / "state.pt")
-        wanted = play_segments(undisturbed, [1, 2])
-        other = trainer_of(config)
-        other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
-        assert play_segments(other, [1, 2]) == wanted
+    undisturbed = trainer_of(config)
+    before = weights_hash(undisturbed.policy)
+    undisturbed.segment(0)
+    torch.save(undisturbed.state(), tmp_path / "state.pt")
+    expected = [undisturbed.segment(number) for number in (1, 2)]
+    other = trainer_of(config)
+    other.restore(torch.load(tmp_path / "state.pt", weights_only=True))
+    assert [other.segment(number) for number in (1, 2)] == expected
     assert weights_hash(other.policy) == weights_hash(undisturbed.policy) != before
     assert other.steps == undisturbed.steps > 0
 
@@ -73,37 +70,37 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
         train(CONFIG, 3, tmp_path, checkpoint_every=1e9, on_segment=stop)
     assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
     assert not (tmp_path / "agent.safetensors").exists()
-    time.sleep(1.0 - time.time() % 1.0)  # TensorBoard orders files by the second of their beginning
     assert train(CONFIG, 3, tmp_path, resume=True)["kept"] == result["kept"]
     assert_same_run(folder, tmp_path)
     for each in (folder, tmp_path):
-        events = EventAccumulator(str(each / "tensorboard")).Reload()
-        steps = [row["steps"] for row in timeless(folder) if "validation" in row]
-        assert [event.step for event in events.Scalars("validation/cost")] == steps
+        events = EventAccumulator(str(each)).Reload()
+        costs = {row["steps"]: row["validation/cost"] for row in timeless(folder) if "validation/cost" in row}
+        assert {event.step: event.value for event in events.Scalars("validation/cost")} == pytest.approx(costs)
+        assert len(events.Scalars("train/loss")) == CONFIG.segments
 
 
 def test_run_json(finished):
     folder, result = finished
     content = about(folder)
-    assert (content["status"], content["method"]) == ("finished", CONFIG.method)
+    assert (content["status"], content["method"]) == ("finished", "apg")
     assert type(CONFIG).from_json(content["config"]) == CONFIG
     assert content == result
     assert content["training"]["segments"] == 3
     assert content["training"]["steps"] == timeless(folder)[-1]["steps"] > 0
     assert {"torch", "stable_baselines3", "numpy", "ikgym"} <= content["versions"].keys()
-    assert [row["segment"] for row in content["validation"]] == [0, 2, 3]
-    costs = [row["cost"] for row in content["validation"]]
-    assert content["kept"]["segment"] == content["validation"][int(np.argmin(costs))]["segment"]
-    assert content["kept"]["validation"]["cost"] == min(costs)
+    rows = [row for row in content["history"] if "validation/cost" in row]
+    assert [row["segment"] for row in rows] == [0, 2, 3]
+    best = min(rows, key=lambda row: row["validation/cost"])
+    assert (content["kept"]["segment"], content["kept"]["cost"]) == (best["segment"], best["validation/cost"])
 
 
 def test_the_agent_plays_as_in_validation(finished):
     folder, result = finished
     scenario = CONFIG.make_scenario()
     policy = baselines.make("agent", scenario, path=str(folder / "agent.safetensors"))
-    episodes = rollouts(scenario, policy, validation_seeds(scenario, CONFIG.validation_episodes))
+    episodes = rollouts(scenario, policy, scenarios.seeds("validation", CONFIG.validation_episodes))
     costs = [float(np.sum(e.tracking_cost + e.velocity_cost)) for e in episodes]
-    assert np.exp(np.mean(np.log(costs))) == pytest.approx(result["kept"]["validation"]["cost"], rel=1e-12)
+    assert np.exp(np.mean(np.log(costs))) == pytest.approx(result["kept"]["cost"], rel=1e-12)
 
 
 @pytest.mark.parametrize("kills", [1, pytest.param(4, marks=pytest.mark.slow)])
@@ -142,17 +139,17 @@ def test_finished_runs_are_left_as_they_are(finished):
     assert timeless(folder) == before
     assert {file.name for file in folder.iterdir() if file.is_file()} - {".lock"} == {
         "run.json",
-        "history.json",
         "checkpoint.pt",
+        "events.out.tfevents.apg",
         "agent.safetensors",
     }
 
 
-def test_a_run_killed_between_its_last_checkpoint_and_the_history_is_complete(finished, tmp_path, monkeypatch):
+def test_a_run_killed_between_its_last_checkpoint_and_its_description_is_complete(finished, tmp_path, monkeypatch):
     write_json = run_module.write_json
 
     def killed(file, content):
-        if file.name == "history.json" and content[-1]["segment"] == CONFIG.segments:
+        if len(content["history"]) > CONFIG.segments:
             raise KeyboardInterrupt
         write_json(file, content)
 
@@ -162,6 +159,36 @@ def test_a_run_killed_between_its_last_checkpoint_and_the_history_is_complete(fi
             train(CONFIG, 3, tmp_path)
     assert train(CONFIG, 3, tmp_path, resume=True)["weights_sha256"] == finished[1]["weights_sha256"]
     assert timeless(tmp_path) == timeless(finished[0])
+
+
+@pytest.mark.parametrize("part", ["checkpoint.pt", "run.json", "events.out.tfevents.apg", "agent.safetensors"])
+def test_a_full_disk_ends_a_run_with_a_message_and_it_is_resumed(part, finished, tmp_path, monkeypatch):
+    """From the second segment on."""
+    write, segments = files.write, []
+
+    def write_if_there_is_space(file, content):
+        if segments and file.name == part:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(file, content)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(files, "write", write_if_there_is_space)
+        with pytest.raises(ResultsError, match=f"^Cannot write .*{part}: No space left on device\\.$"):
+            train(CONFIG, 3, tmp_path, on_segment=lambda done, cost: segments.append(done))
+    train(CONFIG, 3, tmp_path, resume=True)
+    assert_same_run(finished[0], tmp_path)
+
+
+def test_links_are_replaced_and_not_followed(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    theirs = tmp_path / "elsewhere" / "events.out.tfevents.1"
+    theirs.write_text("of somebody else")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "tensorboard").symlink_to(tmp_path / "elsewhere")
+    for file in ("run.json", "checkpoint.pt", "events.out.tfevents.apg", "agent.safetensors"):
+        (tmp_path / "run" / file).symlink_to(theirs)
+    train(CONFIG.replace(segments=1), 3, tmp_path / "run", overwrite=True)
+    assert [file.read_text() for file in (tmp_path / "elsewhere").iterdir()] == ["of somebody else"]
 
 
 def test_seeds_differ_and_validation_changes_nothing(finished, tmp_path):
@@ -186,7 +213,6 @@ def test_folders_are_not_overwritten(finished, tmp_path):
     assert about(tmp_path)["weights_sha256"] != first["weights_sha256"]
     assert (tmp_path / "mine.txt").exists()
     assert not list(tmp_path.glob(".*"))
-    assert len(list((tmp_path / "tensorboard").iterdir())) == 1
 
 
 def test_another_run_is_not_resumed(finished, monkeypatch):
@@ -199,13 +225,6 @@ def test_another_run_is_not_resumed(finished, monkeypatch):
         train(CONFIG, 3, finished[0], resume=True)
 
 
-def saved(content):
-    """A checkpoint with any content."""
-    stream = io.BytesIO()
-    torch.save(content, stream)
-    return sealed(stream.getvalue())
-
-
 class Evil:
     """A pickle that would call something."""
 
@@ -216,18 +235,29 @@ class Evil:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* it is no checkpoint"),
-        ("checkpoint.pt", saved({"format": 99}), "it has another format"),
-        ("checkpoint.pt", saved({"format": FORMAT, "segments": Evil()}), "checkpoint.pt is damaged"),
-        ("checkpoint.pt", saved({"format": FORMAT})[:-1] + b"?", "expected the SHA-256"),  # one byte is another
+        ("checkpoint.pt", b"nothing", "checkpoint.pt is damaged.* its SHA-256 is another"),
+        ("checkpoint.pt", {"format": 99}, "it has another format"),
+        ("checkpoint.pt", {"segments": Evil()}, "checkpoint.pt is damaged"),
         ("run.json", b"{", "run.json is damaged"),
         ("run.json", b'{"format": 2}', f"differs in format \\(2 there, {FORMAT} here\\)"),
     ],
 )
 def test_damaged_files(finished, tmp_path, name, content, message):
     copied(finished[0], tmp_path)
-    (tmp_path / name).write_bytes(content)
+    if isinstance(content, bytes):
+        (tmp_path / name).write_bytes(content)
+    else:
+        save_checkpoint(tmp_path / name, content)
     with pytest.raises(ResultsError, match=message):
+        train(CONFIG, 3, tmp_path, resume=True)
+
+
+def test_a_checkpoint_with_one_other_byte_is_damaged(finished, tmp_path):
+    copied(finished[0], tmp_path)
+    content = bytearray((tmp_path / "checkpoint.pt").read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / "checkpoint.pt").write_bytes(content)
+    with pytest.raises(ResultsError, match="its SHA-256 is another"):
         train(CONFIG, 3, tmp_path, resume=True)
 
 

@@ -13,15 +13,12 @@ import torch
 from torch import Tensor, nn
 
 from baselines.agents.files import AgentFile, agent_of, load_agent
-from baselines.training.config import APG, Activation, TrainingError
 from baselines.training.exporting import ACTIVATIONS, runtime
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.randomness import sequence
+from baselines.training.options import APG, TrainingError
 from ikgym.scenarios import Scenario
 
-#: Metrics of a segment by name.
-SegmentMetrics = dict[str, float]
 #: Factor of the first weights of the last layer.
 QUIET = 0.01
 #: Norm at which gradients with respect to joint coordinates are clipped: longer ones have overflowed.
@@ -29,19 +26,17 @@ OVERFLOW = 1e30
 
 
 class Trainer:
-    """See :class:`APG`: a training that proceeds segment by segment.
+    """Trains an agent, segment by segment.
 
-    Before it is made and before each segment, :func:`baselines.training.randomness.reseed` seeds the generators of
-    Python, NumPy and PyTorch; all other randomness comes from :func:`baselines.training.randomness.sequence`. A segment
-    depends on nothing but :meth:`state` and its number: a run that was killed and resumed from any earlier state ends
-    with the same weights, bit for bit.
+    A segment depends on nothing but the seed, its number and :meth:`state`: a run that was killed and resumed ends with
+    the same weights, bit for bit.
 
     Attributes:
         policy: The network that is evaluated and kept: the average of the actor, whose weights Adam changes.
         steps: Steps of the environment so far, summed over all arms.
 
     Args:
-        config: The options of the method.
+        config: The options.
         scenario: The scenario to train on.
         seed: The seed of the run.
 
@@ -52,6 +47,7 @@ class Trainer:
 
     def __init__(self, config: APG, scenario: Scenario, seed: int) -> None:
         self._law = Law(scenario, config.processing)
+        torch.manual_seed(_sequence(seed, 0).generate_state(3).tolist()[2])
         policy = new_actor((self._law.inputs, *config.hidden, self._law.outputs), config.activation)
         if config.init is not None:
             _load_weights(policy, config)
@@ -61,16 +57,16 @@ class Trainer:
         self._updates = 0
         self._arms = Arms(scenario, config.n_envs, config.offsets, config.hold)
         self._farthest = config.reset_distance
-        self._arms.spread(np.random.default_rng(sequence(seed, None)))
+        self._arms.spread(np.random.default_rng(_sequence(seed, 0)))
         self._far = np.zeros(config.n_envs)
 
-    def segment(self, number: int) -> SegmentMetrics:
-        """Trains for one segment, counted from 0."""
-        config, generator = self._config, np.random.default_rng(sequence(self._seed, number))
+    def segment(self, number: int) -> dict[str, float]:
+        """Trains for one segment, counted from 0; returns its metrics."""
+        config, generator = self._config, np.random.default_rng(_sequence(self._seed, number + 1))
+        window, self._farthest, rate = config.schedule(number)
         for group in self._adam.param_groups:
-            group["lr"] = config.learning_rate_of(number)
+            group["lr"] = rate
         losses, refused, lost = [], 0, 0
-        window, self._farthest = config.window_of(number), config.reset_distance_of(number)
         for _ in range(config.segment_steps // window):
             loss, given_up = self.window(window, generator)
             refused += not self._descend(loss)
@@ -86,20 +82,21 @@ class Trainer:
         return agent_of(network, self._config.processing, self._scenario, training)
 
     def state(self) -> dict[str, Any]:
-        """All that later segments depend on: tensors, numbers, strings, and lists and dicts of them."""
-        parts: dict[str, Any] = {"policy": self.policy, "adam": self._adam, "actor": self._actor}
-        weights = {name: copy.deepcopy(part.state_dict()) for name, part in parts.items()}
-        own = {"steps": self.steps, "updates": self._updates, "far": torch.from_numpy(self._far.copy())}
-        return {**weights, **own, "arms": self._arms.state()}
+        """All that later segments depend on: tensors, numbers, strings, and lists and dicts of them, to be saved."""
+        weights = {name: part.state_dict() for name, part in self._parts.items()}
+        numbers = {"steps": self.steps, "updates": self._updates, "far": torch.from_numpy(self._far)}
+        return {**weights, **numbers, "arms": self._arms.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continues from a :meth:`state` of this process or another."""
-        self.policy.load_state_dict(state["policy"])
-        self._adam.load_state_dict(copy.deepcopy(state["adam"]))
-        self.steps = state["steps"]
-        self._actor.load_state_dict(state["actor"])
-        self._updates, self._far = state["updates"], state["far"].numpy().copy()
+        """Continues from a :meth:`state` that was saved."""
+        for name, part in self._parts.items():
+            part.load_state_dict(state[name])
+        self.steps, self._updates, self._far = state["steps"], state["updates"], state["far"].numpy()
         self._arms.restore(state["arms"])
+
+    @property
+    def _parts(self) -> dict[str, Any]:
+        return {"policy": self.policy, "adam": self._adam, "actor": self._actor}
 
     def window(self, steps: int, generator: np.random.Generator) -> tuple[Tensor, int]:
         """Moves all arms through a window; their states at its start are constants for the gradient.
@@ -191,18 +188,18 @@ def _load_weights(policy: nn.Sequential, config: APG) -> None:
         TrainingError: The agent has another structure.
     """
     assert config.init is not None
-    agent, own = load_agent(config.init), runtime(list(policy), "linear")
-    if (agent.processing, agent.network.to_json()) != (config.processing, own.to_json()):
-        raise TrainingError(
-            f"{config.init}: expected an agent with {config.processing} and a network {own.to_json()}, got "
-            f"{agent.processing} and {agent.network.to_json()}."
-        )
+    agent = load_agent(config.init)
+    expected = config.processing, runtime(list(policy), "linear").to_json()
+    found = agent.processing, agent.network.to_json()
+    if found != expected:
+        words = "an agent with {} and a network {}"
+        raise TrainingError(f"{config.init}: expected {words.format(*expected)}, got {words.format(*found)}.")
     with torch.no_grad():
         for parameter, tensor in zip(policy.parameters(), agent.network.tensors.values(), strict=True):
             parameter.copy_(torch.from_numpy(tensor.copy()))
 
 
-def new_actor(sizes: Sequence[int], activation: Activation) -> nn.Sequential:
+def new_actor(sizes: Sequence[int], activation: str) -> nn.Sequential:
     """Linear layers with activations between them, whose first outputs are almost 0."""
     layers = [nn.Linear(inputs, outputs) for inputs, outputs in itertools.pairwise(sizes)]
     with torch.no_grad():
@@ -210,3 +207,8 @@ def new_actor(sizes: Sequence[int], activation: Activation) -> nn.Sequential:
         layers[-1].bias.zero_()
     hidden = [module for layer in layers[:-1] for module in (layer, ACTIVATIONS[activation]())]
     return nn.Sequential(*hidden, layers[-1])
+
+
+def _sequence(seed: int, part: int) -> np.random.SeedSequence:
+    """The randomness of a part of a run: 0 is before the first segment, n is segment n."""
+    return np.random.SeedSequence(seed, spawn_key=(part,))

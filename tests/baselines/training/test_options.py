@@ -6,8 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from baselines.training.config import APG
-from baselines.training.methods import configure, preset_names
+from baselines.training.options import APG, preset_names
 from ikgym.exceptions import IkgymError, InvalidInputError
 from tests.baselines.training.small import tiny
 
@@ -34,24 +33,24 @@ def test_refused(values, message):
 def test_configurations_are_json():
     config = tiny(n_envs=np.int64(6))
     assert APG.from_json(json.loads(json.dumps(config.to_json()))) == config
-    assert configure("smoke").make_scenario()
-    assert configure(None) == APG()
+    assert APG.preset("smoke").make_scenario()
+    assert APG.preset(None) == APG()
 
 
 def test_values_of_segments():
     config = APG(segments=3, learning_rate=1e-2, learning_rate_end=1e-4)
-    assert [config.learning_rate_of(n) for n in range(3)] == pytest.approx([1e-2, 1e-3, 1e-4], rel=1e-12)
+    assert [config.schedule(n).learning_rate for n in range(3)] == pytest.approx([1e-2, 1e-3, 1e-4], rel=1e-12)
     assert (APG(steps=50).make_scenario().steps, APG(steps=5000).make_scenario().steps) == (50, 1000)
     config = tiny(segments=8, window=(16, 48), reset_distance=0.3, reset_distance_end=0.5)
-    assert [config.window_of(number) for number in range(8)] == [16] * 4 + [48] * 4
-    assert [config.reset_distance_of(number) for number in range(8)] == [0.3] * 4 + [0.5] * 4
+    assert [config.schedule(number).window for number in range(8)] == [16] * 4 + [48] * 4
+    assert [config.schedule(number).reset_distance for number in range(8)] == [0.3] * 4 + [0.5] * 4
 
 
 def test_presets(tmp_path):
     assert preset_names() == ("quick", "standard", "long", "smoke")
     (tmp_path / "mine.toml").write_text("windo = 2\n")
     with pytest.raises(IkgymError, match="no option of apg 'windo'"):
-        configure(str(tmp_path / "mine.toml"))
+        APG.preset(str(tmp_path / "mine.toml"))
     (tmp_path / "mine.toml").write_text("window = \n")
     os.mkfifo(tmp_path / "pipe.toml")
     for name, message in (
@@ -60,4 +59,4 @@ def test_presets(tmp_path):
         ("pipe.toml", "Cannot read .*pipe.toml: expected a regular file"),
     ):
         with pytest.raises(InvalidInputError, match=message):
-            configure(str(tmp_path / name))
+            APG.preset(str(tmp_path / name))
