@@ -49,7 +49,7 @@ def write(
         out: The folder. Minari knows the data set by its name, such as ``dls-v0``.
         episodes: Number of episodes, the first seeds of the split.
         split: The split, see :data:`ikgym.scenarios.SPLITS`.
-        preview: Steps ahead that the policy is shown; its own preview if left out.
+        preview: Steps ahead that the policy is shown; the preview of the policy if left out.
         overwrite: Whether to replace the data set in the folder.
         progress: Whether to show a progress bar on stderr.
 
@@ -100,7 +100,7 @@ def write(
             }
         )
         if env.spec is None:
-            with contextlib.suppress(InvalidInputError):  # a trajectory of the user's own class, which no file can hold
+            with contextlib.suppress(InvalidInputError):  # a trajectory of a user's class, which no file can hold
                 first.scenario.save(out / "scenario.toml")
         shutil.rmtree(data, ignore_errors=True)
         draft.rename(data)

@@ -28,7 +28,7 @@ from baselines.evaluation.table import from_csv, to_csv
 from baselines.files import write
 from baselines.training.options import Rewards
 from baselines.training.rewards import train
-from baselines.training.zoo import ALGORITHMS, SETTINGS, entries, read
+from baselines.training.zoo import ALGORITHMS, SETTINGS, read_entries, read_settings
 from ikgym import rl
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -72,7 +72,7 @@ class Command:
         minutes, out = MINUTES if self.defaults else None, []
         pairs = list(itertools.product(self.environments or rl.IDS, self.algorithms))
         if self.environments is None:
-            pairs = [(env, name) for env, name in pairs if env in entries(SETTINGS / f"{name}.yml")]
+            pairs = [(env, name) for env, name in pairs if env in read_entries(SETTINGS / f"{name}.yml")]
         for seed, (env, algorithm) in itertools.product(self.seeds, pairs):
             config = Rewards(algorithm=algorithm, env=env, minutes=minutes, defaults=self.defaults)
             folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
@@ -83,7 +83,7 @@ class Command:
 def about(training: Training) -> Line:
     """What a training is known by."""
     config = training.config
-    digest = hashlib.sha256(json.dumps(read(config), sort_keys=True).encode()).hexdigest()[:8]
+    digest = hashlib.sha256(json.dumps(read_settings(config), sort_keys=True).encode()).hexdigest()[:8]
     kind = "defaults" if config.defaults else "published"
     return dict(zip(RUN, (config.env, config.algorithm, kind, digest, str(training.seed)), strict=True))
 

@@ -144,7 +144,7 @@ def train(name: str, seed: int, steps: int) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     learner, task = LEARNERS[name]
-    settings = zoo.read(learner)
+    settings = zoo.read_settings(learner)
     model = rewards.make(learner.algorithm, LearningVecEnv(settings["n_envs"], task), settings, seed)
     begin = time.process_time()
     model.learn(steps)

@@ -136,7 +136,7 @@ def untrained() -> None:
 
     def by_rewards(algorithm: str, seed: int) -> AgentFile:
         config = Rewards(algorithm=algorithm, env="ikgym/Track-v0")
-        settings = zoo.read(config)
+        settings = zoo.read_settings(config)
         envs = ikgym.sb3.make_vec(config.env, settings["n_envs"])
         return agent_of_model(rewards.make(algorithm, envs, settings, seed), envs)
 

@@ -97,7 +97,7 @@ class RedundantIKVecEnv(VecEnv):
         Raises:
             UnknownNameError: There is no such option.
             InvalidInputError: Seeds or options are not valid, or some rows have a start and others do not. The
-                episodes go on then, and seeds and options stay as they are.
+                episodes continue then, and seeds and options are kept.
         """
         observation: Observation
         observation, _ = self._envs.reset(seed=self._seeds, options=self._checked_options())

@@ -4,7 +4,7 @@ import pytest
 
 from baselines.evaluation.table import from_csv, to_csv
 from baselines.training.options import Rewards
-from baselines.training.zoo import read
+from baselines.training.zoo import read_settings
 from benchmarks import learning
 from ikgym import rl
 from ikgym.exceptions import UnknownNameError
@@ -43,7 +43,7 @@ def test_algorithms_are_trained_where_settings_are_published():
     assert set(pairs) == {(*one, seed) for one in [*((env, "ppo") for env in rl.IDS), *recurrent] for seed in (0, 1)}
     [other] = learning.Command(("recurrent_ppo",), ("ikgym/Track-v0",), seeds=(0,)).trainings()
     with pytest.raises(UnknownNameError, match="Available: ikgym/Camera-v0, ikgym/Payload-v0"):
-        read(other.config)
+        read_settings(other.config)
 
 
 def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
@@ -57,6 +57,6 @@ def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
     [row] = learning.table(lines)
     assert row["seeds"] == 1
     assert row["best"] == pytest.approx(rl.score({"ikgym/Track-v0": [[1.0]]})["ikgym/Track-v0"].best, abs=1e-3)
-    assert read(training.config)["n_envs"] == 64
+    assert read_settings(training.config)["n_envs"] == 64
     [panel] = learning.picture(lines).axes
     assert len(panel.lines) == 1

@@ -6,7 +6,7 @@ import pytest
 
 from baselines import registry
 from baselines.spec import parse_policy
-from baselines.tuning.ranges import RANGES, read
+from baselines.tuning.ranges import RANGES, read_ranges
 from docs import keeping, measure
 
 POSE = [one for one in keeping.lines("pose") if one["scenario"] == "varga7-pose-random"]
@@ -15,7 +15,7 @@ SLOW = {"rhc_gradient", "full_orientation"}
 HEAD = "policy,scenario,seeds,episodes,cost_ratio,time_p99_us,front\n"
 
 
-@pytest.mark.parametrize("name", sorted({spec.partition(":")[0] for spec in read(RANGES)} - SLOW))
+@pytest.mark.parametrize("name", sorted({spec.partition(":")[0] for spec in read_ranges(RANGES)} - SLOW))
 def test_tuned_solvers_have_two_rows(name):
     """One with the defaults and one with the settings that were tuned on validation episodes."""
     assert sum(parsed(one["policy"])[0] == name for one in POSE) >= 2

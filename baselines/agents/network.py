@@ -74,9 +74,7 @@ class Network(Frozen):
         for array in (*weights, *biases, *packed):
             array.flags.writeable = False
         constants = (*packed, ACTIVATIONS.index(self.activation), SQUASHES.index(self.squash))
-        fields = {"weights": weights, "biases": biases, "sizes": sizes, "constants": constants}
-        for name, value in fields.items():
-            object.__setattr__(self, name, value)
+        self._settle(weights=weights, biases=biases, sizes=sizes, constants=constants)
 
     @property
     def tensors(self) -> dict[str, Singles]:

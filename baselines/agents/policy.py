@@ -10,15 +10,16 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bounds import keep_rows
 from baselines.agents.files import AgentFile, load_agent
 from baselines.agents.processing import Held
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
 from baselines.solvers.quadratic_program.limits import limits_with_braking
+from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.wrappers import full_orientation
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.jit import kernel
 from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, flag, whole_number
 
@@ -115,7 +116,7 @@ class LearnedPolicy(SolverPolicy):
     def memory(self, rows: int) -> Memory:
         """Nothing held, and an evaluation of the network due."""
         processing = self.file.processing
-        held = Held(np.zeros((rows, processing.held(self.seen))), np.zeros(rows, dtype=np.int64))
+        held = Held(np.zeros((rows, processing.held_size(self.seen))), np.zeros(rows, dtype=np.int64))
         return AgentMemory(*held, *full_orientation.start_memory(rows))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
@@ -254,3 +255,27 @@ def check_scenario(agent: AgentFile, problem: Problem, *, any_arm: bool) -> None
             f"Agent {agent.source} was trained for the arm {about['arm']['name']}, which moves differently from "
             f"{model.name}: expected that arm, or any_arm=True, as in agent:path=FILE,any_arm=True."
         )
+
+
+@kernel
+def keep_rows(limits, dt, velocity_limit, q, last, action):
+    """Bounds actions, row by row, as those of the policy `qp`: a joint brakes ahead of its stop. NaN stays NaN.
+
+    Args:
+        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
+        dt: Δt in [s].
+        velocity_limit: Shape (n,).
+        q: Shape (B, n).
+        last: Joint velocities last applied. Shape (B, n).
+        action: Fractions of the velocity limit, changed in place. Shape (B, n).
+    """
+    n = q.shape[1]
+    lower, upper = np.empty(n), np.empty(n)
+    for row in range(q.shape[0]):
+        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        for j in range(n):
+            share = action[row, j]
+            if share * velocity_limit[j] > upper[j]:
+                action[row, j] = upper[j] / velocity_limit[j]
+            elif share * velocity_limit[j] < lower[j]:
+                action[row, j] = lower[j] / velocity_limit[j]

@@ -40,8 +40,8 @@ class Processing(Frozen, abc.ABC):
 
     def to_json(self) -> dict[str, Any]:
         """The kind and the fields, as JSON values."""
-        values = {name: getattr(self, name) for name in _fields(type(self))}
-        return {"kind": self.kind, **{k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}}
+        values = {name: list(v) if isinstance(v, tuple) else v for name, v in self._fields().items()}
+        return {"kind": self.kind, **values}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -51,7 +51,8 @@ class Processing(Frozen, abc.ABC):
             UnknownNameError: A key is not a field.
             InvalidInputError: A value is refused.
         """
-        known_names("field of the processing", values, ["kind", *_fields(cls)])
+        fields = [field.name for field in dataclasses.fields(cls) if field.init]  # type: ignore[arg-type]  # subclasses
+        known_names("field of the processing", values, ["kind", *fields])
         return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if name != "kind"})
 
     @abc.abstractmethod
@@ -67,7 +68,7 @@ class Processing(Frozen, abc.ABC):
         """The number of network outputs."""
 
     @abc.abstractmethod
-    def held(self, problem: Problem) -> int:
+    def held_size(self, problem: Problem) -> int:
         """The number of values that are held between evaluations of the network."""
 
     @abc.abstractmethod
@@ -84,7 +85,3 @@ class Processing(Frozen, abc.ABC):
         Returns:
             Shape (B, n).
         """
-
-
-def _fields(kind: Any) -> list[str]:
-    return [field.name for field in dataclasses.fields(kind) if field.init]

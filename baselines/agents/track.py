@@ -12,10 +12,10 @@ from baselines.agents.network import Network
 from baselines.agents.processing import Held, Processing
 from baselines.policy import Batch, Problem
 from ikgym.rl.task import steps_ahead
-from ikgym.rl.track import middle
+from ikgym.rl.track import joint_scales
 from ikgym.rl.track_kernels import track_rows
 from ikgym.rl.twists import twist_size
-from ikgym.validation import FloatArray, number
+from ikgym.validation import FloatArray, Positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Track(Processing):
     """
 
     ahead: tuple[float, ...]
-    share: float = 1.0
-    radian: float = 0.3
-    coarse: float = 0.03
-    fine: float = 0.01
+    share: Positive = 1.0
+    radian: Positive = 0.3
+    coarse: Positive = 0.03
+    fine: Positive = 0.01
 
     kind: ClassVar[str] = "track"
     #: Steps for which an action was held in the training.
@@ -48,10 +48,9 @@ class Track(Processing):
     bounded: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         steps_ahead(self.ahead, 1.0)
-        numbers = {name: number(name, getattr(self, name), above=0.0) for name in ("share", "radian", "coarse", "fine")}
-        for field, value in {"ahead": tuple(map(float, self.ahead)), **numbers}.items():
-            object.__setattr__(self, field, value)
+        self._settle(ahead=tuple(map(float, self.ahead)))
 
     def steps(self, problem: Problem) -> tuple[int, ...]:
         """See :meth:`Processing.steps`."""
@@ -65,7 +64,7 @@ class Track(Processing):
         """The number of network outputs: one a joint."""
         return problem.model.joints
 
-    def held(self, problem: Problem) -> int:
+    def held_size(self, problem: Problem) -> int:
         """The number of values that are held between evaluations of the network: its outputs."""
         return problem.model.joints
 
@@ -85,4 +84,4 @@ class Track(Processing):
 @functools.lru_cache
 def _arm(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Where joints are seen from, their units, and their largest velocities. Shapes (n,)."""
-    return *middle(problem.model), problem.largest_qdot
+    return *joint_scales(problem.model), problem.largest_qdot

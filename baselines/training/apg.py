@@ -122,9 +122,9 @@ class Trainer:
                 total = total + arms.relative(spent, config.cost_prior_steps)[over].sum()
                 spent = torch.where(over, 0.0, spent)
                 given_up += self._renew(generator)
-            q, qdot = _limited(arms.q, OVERFLOW), _limited(arms.qdot, OVERFLOW)
+            q, qdot = _clip_gradients(arms.q, OVERFLOW), _clip_gradients(arms.qdot, OVERFLOW)
             features, speed = self._law.features(q, arms.ahead, arms.remaining)
-            held = _limited(self._law.held(q, features, self._actor(features.to(precision)).double()), most)
+            held = _clip_gradients(self._law.gains(q, features, self._actor(features.to(precision)).double()), most)
             rows = arms.rows(config.hold, speed)
             arms.q, arms.qdot, cost, self._far = self._law.move(q, qdot, held, rows)
             arms.advance(rows.steps, cost)
@@ -166,7 +166,7 @@ class Trainer:
                 mean.lerp_(weights, 1.0 - kept)
 
 
-def _limited(tensor: Tensor, most: float) -> Tensor:
+def _clip_gradients(tensor: Tensor, most: float) -> Tensor:
     """The same tensor, with gradients clipped row by row at a norm; gradients that overflowed count as 0."""
 
     def cut(gradient: Tensor) -> Tensor:

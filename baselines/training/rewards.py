@@ -19,7 +19,7 @@ import ikgym.sb3
 from baselines.files import csv_text, reading, reason, resumed, write, write_json
 from baselines.training.exporting import export
 from baselines.training.options import Rewards
-from baselines.training.zoo import ALGORITHMS, arguments, read
+from baselines.training.zoo import ALGORITHMS, arguments, read_settings
 from ikgym import rl
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.sb3 import LearningVecEnv
@@ -64,7 +64,7 @@ def train(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str, Any]:
     return about
 
 
-def finished(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str, Any] | None:
+def read_finished(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str, Any] | None:
     """The `run.json` in a folder, if the same run has ended there.
 
     Raises:
@@ -86,7 +86,7 @@ def identity(config: Rewards, seed: int) -> dict[str, Any]:
         UnknownNameError: The settings have no entry for the environment.
         InvalidInputError: The settings cannot be read.
     """
-    settings = read(config)
+    settings = read_settings(config)
     settings["n_timesteps"] = config.total_timesteps or settings["n_timesteps"]
     about = {"env": config.env, "algorithm": config.algorithm, "seed": seed}
     return {**about, "settings": settings, "minutes": config.minutes}

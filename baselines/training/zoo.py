@@ -47,7 +47,7 @@ BOUNDS: dict[str, dict[str, Any]] = {
 }
 
 
-def read(config: Rewards) -> dict[str, Any]:
+def read_settings(config: Rewards) -> dict[str, Any]:
     """The settings of algorithm and environment, as the file has them.
 
     Raises:
@@ -56,7 +56,7 @@ def read(config: Rewards) -> dict[str, Any]:
     """
     if config.defaults:
         return {"n_timesteps": 1_000_000}
-    content = entries(SETTINGS / f"{config.algorithm}.yml" if config.settings is None else config.settings)
+    content = read_entries(SETTINGS / f"{config.algorithm}.yml" if config.settings is None else config.settings)
     known_name("environment in the settings", config.env, content)
     entry = content[config.env]
     if not isinstance(entry, dict) or "n_timesteps" not in entry:
@@ -69,7 +69,7 @@ def read(config: Rewards) -> dict[str, Any]:
     return {**entry, "n_timesteps": int(steps)}
 
 
-def entries(file: pathlib.Path) -> dict[str, Any]:
+def read_entries(file: pathlib.Path) -> dict[str, Any]:
     """The entries of a file of settings by the ids of their environments.
 
     Raises:
@@ -93,7 +93,7 @@ def arguments(algorithm: str, settings: Mapping[str, Any], joints: int) -> dict[
 
     Args:
         algorithm: One of :data:`ALGORITHMS`.
-        settings: Values by name, as :func:`read` gives them.
+        settings: Values by name, as :func:`read_settings` gives them.
         joints: Number of joints, for the noise of actions.
 
     Raises:

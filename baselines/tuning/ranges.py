@@ -34,7 +34,7 @@ RANGES = pathlib.Path(__file__).parents[1] / "data" / "ranges.toml"
 Range = Mapping[str, Any]
 
 
-def read(file: pathlib.Path) -> dict[str, dict[str, Range]]:
+def read_ranges(file: pathlib.Path) -> dict[str, dict[str, Range]]:
     """The ranges in a TOML file, by solver and parameter.
 
     Raises:
@@ -63,7 +63,7 @@ def _distribution(line: Range) -> CategoricalDistribution | FloatDistribution | 
     return kind(low, high, log=log)
 
 
-def of(spec: str, ranges: Mapping[str, Mapping[str, Range]]) -> Mapping[str, Range]:
+def ranges_of(spec: str, ranges: Mapping[str, Mapping[str, Range]]) -> Mapping[str, Range]:
     """The ranges of a solver: the table of its specification, or of its name without the given parameters.
 
     Raises:
@@ -83,7 +83,7 @@ def of(spec: str, ranges: Mapping[str, Mapping[str, Range]]) -> Mapping[str, Ran
     return found
 
 
-def suggested(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any]) -> dict[str, Any]:
+def suggest(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters of a trial; a name with a dot replaces one key of a given parameter."""
     out: dict[str, Any] = {}
     for name, line in ranges.items():
@@ -96,11 +96,11 @@ def suggested(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any
             value = trial.suggest_int(name, kind.low, kind.high, log=kind.log)
         else:
             value = rounded(trial.suggest_float(name, kind.low, kind.high, log=kind.log), DIGITS)
-        out |= nested(name, value, {**given, **out})
+        out |= nest(name, value, {**given, **out})
     return out
 
 
-def nested(name: str, value: object, given: Mapping[str, Any]) -> dict[str, Any]:
+def nest(name: str, value: object, given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameter that a name with a dot belongs to, with one key changed and the other given ones kept."""
     outer, _, inner = name.partition(".")
     return {outer: {**given.get(outer, {}), inner: value} if inner else value}

@@ -23,7 +23,7 @@ from baselines.files import ResultsError, check_flags, read_bytes, reading
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from baselines.spec import parse_policy
-from baselines.tuning.ranges import RANGES, Range, nested, of, read, suggested
+from baselines.tuning.ranges import RANGES, Range, nest, ranges_of, read_ranges, suggest
 from baselines.workers import Workers, finished
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
@@ -67,7 +67,7 @@ class Search:
         Raises:
             TrialPruned: It is above the median of earlier trials after a part of the episodes.
         """
-        settings = suggested(trial, self.ranges, parse_policy(self.spec)[1])
+        settings = suggest(trial, self.ranges, parse_policy(self.spec)[1])
         trial.set_user_attr("settings", settings)
         costs: list[float] = []
         while len(costs) < len(self.seeds):
@@ -116,11 +116,14 @@ def searches(
         raise InvalidInputError(
             f"{scenario.name} is the same at every reset: expected a scenario whose episodes differ."
         )
-    seeds, ranges = scenarios.seeds(SPLIT, episodes), {**read(RANGES), **({} if file is None else read(file))}
+    seeds, ranges = (
+        scenarios.seeds(SPLIT, episodes),
+        {**read_ranges(RANGES), **({} if file is None else read_ranges(file))},
+    )
     whole_number("seed", seed, at_least=0)
-    found = [Search(scenario, spec, of(spec, ranges), seeds, seed) for spec in policies or ranges]
+    found = [Search(scenario, spec, ranges_of(spec, ranges), seeds, seed) for spec in policies or ranges]
     names = {one.spec.partition(":")[0] for one in found}
-    if file is not None and names.isdisjoint(spec.partition(":")[0] for spec in read(file)):
+    if file is not None and names.isdisjoint(spec.partition(":")[0] for spec in read_ranges(file)):
         raise InvalidInputError(f"{file}: expected ranges of a solver that is searched, {', '.join(policies)}.")
     if not policies:
         found = [one for one in found if _suits(one)]
@@ -129,7 +132,7 @@ def searches(
         for name, line in one.ranges.items():
             needed = {other: values[0] for other, values in line.get("when", {}).items()}
             for value in line.get("choices") or (line["low"], line["high"]):
-                one.make(needed | nested(name, value, {**given, **needed}))
+                one.make(needed | nest(name, value, {**given, **needed}))
     return found
 
 

@@ -86,7 +86,7 @@ class LearningVectorEnv(RedundantIKVectorEnv):
         """One step of all arms, see :class:`ikgym.rl.Task`."""
         fractions, waiting, begun = self._learner.actions(actions), self._ended, self._none
         seen, _, terminated, truncated, infos = super().step(fractions)
-        rewards = self._learner.rewards(functools.partial(_told, infos, self.num_envs))
+        rewards = self._learner.rewards(functools.partial(_step_value, infos, self.num_envs))
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             begun = waiting
             rewards[begun] = 0.0  # these rows have begun an episode, and taken no step
@@ -151,7 +151,7 @@ def _one_row(seen: dict[str, FloatArray]) -> dict[str, FloatArray]:
     return {key: value[None] for key, value in seen.items()}
 
 
-def _told(infos: dict[str, Any], rows: int, key: str) -> FloatArray:
+def _step_value(infos: dict[str, Any], rows: int, key: str) -> FloatArray:
     """A value of the step just made, also of rows whose next episode has begun since; 0 without a step. Shape (N,)."""
     found: FloatArray = infos.get(key, np.zeros(rows))
     final = infos.get("final_info", {}).get(key)

@@ -31,7 +31,7 @@ class TaskEnv(LearningEnv):
     metadata: ClassVar[dict[str, Any]] = {**RedundantIKEnv.metadata, "render_fps": 100}  # type: ignore[misc]
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
-        super().__init__(self._changed(changes), render_mode)
+        super().__init__(self._change_task(changes), render_mode)
 
     @classmethod
     def arms(cls, num_envs: int = 1, **options: Any) -> LearningVectorEnv:
@@ -43,11 +43,11 @@ class TaskEnv(LearningEnv):
                 and changes as for one arm.
         """
         known = ("autoreset_mode", "render_mode", "max_episode_steps")
-        own = {name: options.pop(name) for name in known if name in options}
-        return LearningVectorEnv(num_envs, cls._changed(options), **own)
+        others = {name: options.pop(name) for name in known if name in options}
+        return LearningVectorEnv(num_envs, cls._change_task(options), **others)
 
     @classmethod
-    def _changed(cls, changes: dict[str, Any]) -> Task:
+    def _change_task(cls, changes: dict[str, Any]) -> Task:
         try:
             return cls.task.replace(**changes)
         except UnknownNameError as e:

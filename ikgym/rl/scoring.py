@@ -54,7 +54,7 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
 
     Raises:
         UnknownNameError: There is no such environment or split.
-        InvalidInputError: There are not so many episodes, the model has no such `predict`, or its action is refused.
+        InvalidInputError: The split has fewer episodes, the model has no such `predict`, or its action is refused.
     """
     kind = environment(name)
     seeds = scenarios.seeds(split, whole_number("episodes", episodes, at_least=1))
@@ -126,13 +126,13 @@ def _score(name: str, value: npt.ArrayLike, yardstick: Mapping[str, float]) -> S
     if cost.ndim != 2 or 0 in cost.shape or (cost < 0.0).any():
         raise InvalidInputError(f"{name}: expected costs of at least 0 of shape (seeds, episodes), got {cost.shape}.")
 
-    def scored(logarithm: Any) -> Any:
+    def to_score(logarithm: Any) -> Any:
         return (yardstick["still"] - logarithm) / (yardstick["still"] - yardstick["dls"])
 
-    seeds = scored(np.log1p(cost).mean(axis=1))
+    seeds = to_score(np.log1p(cost).mean(axis=1))
     drawn = np.random.default_rng(0).choice(seeds, (RESAMPLES, len(seeds)))
     low, high = np.quantile(interquartile_mean(drawn), [0.025, 0.975]).tolist()
-    return Score(float(interquartile_mean(seeds)), low, high, scored(yardstick["best"]))
+    return Score(float(interquartile_mean(seeds)), low, high, to_score(yardstick["best"]))
 
 
 @functools.cache

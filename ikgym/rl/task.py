@@ -39,7 +39,7 @@ class Task(Frozen):
     Errors have w components, 3 for tasks of position alone, else 6. They are measured ones, seen from the frame of
     joint 1, so that a turn of joint 1 changes none of them; from the base frame where joint 1 is prismatic, and for
     skew coordinates, which are no vector. Without a home joints are seen from the middle of their range, or from 0;
-    half of a range is 1 m where a prismatic joint has none. With a `history` the last observations stand side by side,
+    half of a range is 1 m where a prismatic joint has none. With a `history` the last observations are concatenated,
     newest first: where measurements are late or missing, earlier commands and measurements tell where the arm is now.
     An episode begins with its first observation repeated.
 

@@ -23,8 +23,8 @@ UNIT = 1e-3
 OLDEST = 10.0
 #: Observations of N rows, or of one without a row axis.
 Features = npt.NDArray[np.float32]
-#: Values of `info` by key, for the steps that are rewarded. Shape (N,).
-Told = Callable[[str], FloatArray]
+#: Gives a value of `info` by its key, for the steps that are rewarded. Shape (N,).
+StepValue = Callable[[str], FloatArray]
 
 
 class Learner:
@@ -47,11 +47,11 @@ class Learner:
     ) -> None:
         kind, self._fastest = scenario.task.kind, scenario.largest_qdot
         scales = task.radian, task.coarse, task.fine
-        self._command = kind, scenario.model.chain, scales, *middle(scenario.model), self._fastest
+        self._command = kind, scenario.model.chain, scales, *joint_scales(scenario.model), self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
-        self._own = 2 * (scenario.joints + len(preview) * int(twist_size(kind)))
+        self._size = 2 * (scenario.joints + len(preview) * int(twist_size(kind)))
         self._contexts = len(scenario.plant.context) if task.context else 0
-        size = self._own + spaces.flatdim(spaces.Dict({key: space[key] for key in self._more})) + self._contexts
+        size = self._size + spaces.flatdim(spaces.Dict({key: space[key] for key in self._more})) + self._contexts
         self.observation_space = spaces.Box(-MOST, MOST, (task.history * size,), np.float32)
         self._history, self._context = np.zeros((rows or 1, task.history, size), np.float32), np.zeros((rows or 1, 0))
         self._fraction = task.share * self._fastest / scenario.velocity_limit
@@ -101,11 +101,11 @@ class Learner:
         fractions: FloatArray = np.clip(raw.astype(np.float64), -1.0, 1.0) * self._fraction
         return fractions
 
-    def rewards(self, told: Told) -> FloatArray:
+    def rewards(self, value: StepValue) -> FloatArray:
         """Rewards from the costs and errors of the step. Shape (N,)."""
-        position = told("position_error")
-        orientation = told("orientation_error") if self._oriented else np.zeros(len(position))
-        others = told("velocity_cost") + told("proximity_cost") if self._near else told("velocity_cost")
+        position = value("position_error")
+        orientation = value("orientation_error") if self._oriented else np.zeros(len(position))
+        others = value("velocity_cost") + value("proximity_cost") if self._near else value("velocity_cost")
         out = np.empty(len(position))
         distance_rewards(self._scales, position, orientation, others, out)
         return out
@@ -117,18 +117,18 @@ class Learner:
     def _features(self, seen: dict[str, FloatArray], context: FloatArray) -> Features:
         """The observations of the moment. Shape (N, f)."""
         rows = len(context)
-        own = np.empty((rows, self._own))
-        track_rows(*self._command, *(seen[key] for key in ("q", "qdot", "pose", "nominal")), own)
-        more = [self._scaled(key, seen[key]).reshape(rows, -1) for key in self._more]
-        return np.concatenate([own, *more, context], axis=1).astype(np.float32)
+        model = np.empty((rows, self._size))
+        track_rows(*self._command, *(seen[key] for key in ("q", "qdot", "pose", "nominal")), model)
+        more = [self._scale(key, seen[key]).reshape(rows, -1) for key in self._more]
+        return np.concatenate([model, *more, context], axis=1).astype(np.float32)
 
-    def _scaled(self, key: str, value: FloatArray) -> FloatArray:
+    def _scale(self, key: str, value: FloatArray) -> FloatArray:
         """Past commands as shares of the largest joint velocities, ages in units of ten steps."""
         scaled: FloatArray = np.clip(value / (self._fastest if key == "commands" else OLDEST), -MOST, MOST)
         return scaled
 
 
-def middle(arm: Arm) -> tuple[FloatArray, FloatArray]:
+def joint_scales(arm: Arm) -> tuple[FloatArray, FloatArray]:
     """Where joints are seen from, in [rad] or [m], and the unit of their coordinates. Shapes (n,).
 
     Home, or the middle of the range where there is no home, and 0 without a range. The unit is 1 rad; for a prismatic

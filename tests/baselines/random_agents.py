@@ -35,7 +35,7 @@ def random_agent(scenario, *, zero=False, hidden=(16, 9), seed=0, training=None,
 
 def nothing_held(processing, problem, rows):
     """What is held before the first evaluation of a network."""
-    return Held(np.zeros((rows, processing.held(problem))), np.zeros(rows, dtype=np.int64))
+    return Held(np.zeros((rows, processing.held_size(problem))), np.zeros(rows, dtype=np.int64))
 
 
 def write_agent(file, scenario, **options):

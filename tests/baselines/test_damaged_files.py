@@ -45,7 +45,7 @@ TIMELESS = b"x,y,z\n1,2,3\n4,5.5,6\n7,8,9e-1\n"
 READERS = {
     "scenario.toml": scenarios.load,
     "preset.toml": lambda file: APG.preset(str(file)),
-    "ranges.toml": ranges.read,
+    "ranges.toml": ranges.read_ranges,
     "points.csv": from_csv,
     "arm.urdf": arms.from_urdf,
     "it.safetensors": load_agent,

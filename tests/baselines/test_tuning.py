@@ -18,7 +18,7 @@ from baselines.cli.commands.tune import main
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from baselines.tuning import Search
-from baselines.tuning.ranges import RANGES, of, read, suggested
+from baselines.tuning.ranges import RANGES, ranges_of, read_ranges, suggest
 from baselines.tuning.search import DONE, JOURNAL, _study
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -120,12 +120,12 @@ def test_a_killed_command_is_resumed_by_several_workers(tmp_path, plays):
 
 
 def test_settings_of_all_ranges_make_a_solver_that_looks_no_further():
-    ranges = read(RANGES)
+    ranges = read_ranges(RANGES)
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     for one in tuning.searches(scenarios.get("varga7-random")):
         ahead = one.make({}).preview
         for _ in range(8):
-            settings = suggested(study.ask(), one.ranges, parse_policy(one.spec)[1])
+            settings = suggest(study.ask(), one.ranges, parse_policy(one.spec)[1])
             assert settings
             assert one.make(settings).preview == ahead
     left_out = {*ranges} - {one.spec for one in tuning.searches(scenarios.get("varga7-pose-random"))}
@@ -140,13 +140,13 @@ def test_parameters_within_another_and_under_a_condition():
     }
     study, seen = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0)), set()
     for _ in range(20):
-        found = suggested(study.ask(), ranges, {"options": {"horizon": 3}})
+        found = suggest(study.ask(), ranges, {"options": {"horizon": 3}})
         assert found["options"]["horizon"] == 3
         assert 0.1 <= found["options"]["gain"] <= 0.2
         assert ("x" in found) == (found["rule"] == "a")
         seen.add(found.get("x"))
     assert seen == {None, 1, 2, 3}
-    assert list(of("dls:gain=0.5", read(RANGES))) == ["damping"]
+    assert list(ranges_of("dls:gain=0.5", read_ranges(RANGES))) == ["damping"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import ikgym.sb3
 from ikgym import rl
 from ikgym.exceptions import ResetNeededError
 from ikgym.rendering.renderer import HEIGHT, WIDTH
-from ikgym.rl.track import middle
+from ikgym.rl.track import joint_scales
 from tests.comparison import identical, played_alike, random_actions
 
 N = 3
@@ -86,16 +86,16 @@ def test_what_an_arm_sees_of_a_task(name, task):
 
 def test_joints_are_seen_from_home_or_the_middle_of_their_range():
     panda, fetch, unlimited = map(ikgym.arms.get, ("panda", "fetch", "varga7"))
-    home, units = middle(panda)
+    home, units = joint_scales(panda)
     assert np.array_equal(home, panda.home)
     assert units.tolist() == [1.0] * 7
-    assert np.array_equal(middle(panda.replace(home=None))[0], 0.5 * (panda.upper + panda.lower))
-    assert middle(fetch)[1].tolist() == [0.5 * (fetch.upper - fetch.lower)[0], *[1.0] * 7]
-    home, units = middle(unlimited)
+    assert np.array_equal(joint_scales(panda.replace(home=None))[0], 0.5 * (panda.upper + panda.lower))
+    assert joint_scales(fetch)[1].tolist() == [0.5 * (fetch.upper - fetch.lower)[0], *[1.0] * 7]
+    home, units = joint_scales(unlimited)
     assert not home.any()
     assert units.tolist() == [1.0] * 7
     one_sided = unlimited.replace(lower=[0.5, *[-np.inf] * 6])
-    assert middle(one_sided)[0].tolist() == [0.5, *[0.0] * 6]
+    assert joint_scales(one_sided)[0].tolist() == [0.5, *[0.0] * 6]
 
 
 def test_the_context_ends_the_observation_and_is_that_of_the_plant():

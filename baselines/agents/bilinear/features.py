@@ -154,7 +154,7 @@ def rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
             task_kernels.coordinates(kind, rotation, position, pose)
             twist(kind, nominal[row, i], pose, error, due)
             if not damped_step(jacobian[:w], due, DAMPING, gram, scratch, step):
-                step[:] = np.nan  # an unknown rate must not look like a rate of 0
+                step[:] = np.nan  # an unknown rate must not fill_kinematics like a rate of 0
             for j in range(n):
                 step[j] = within(step[j], FARTHEST)
                 posture[j] += step[j]

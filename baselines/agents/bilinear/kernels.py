@@ -1,7 +1,7 @@
 """Kernels of the law of the bilinear agent, and of the damped inverse that its network tunes.
 
 With J the Jacobian of the twist, in the frame in which twists are seen, U a diagonal metric of the joints and λ a
-damping, which the network gives beside G and h,
+damping, which are network outputs like G and h,
 
     G' = G + U Jᵀ (J U Jᵀ + λ I)⁻¹
 
@@ -27,7 +27,7 @@ LARGEST = 6.0
 
 
 @kernel
-def held_rows(kind, chain, damping, q, output, out):
+def gain_rows(kind, chain, damping, q, output, out):
     """(G', h'), row by row.
 
     Args:
@@ -41,18 +41,18 @@ def held_rows(kind, chain, damping, q, output, out):
     n, w = q.shape[1], twist_size(kind)
     jacobian, metric, products, moved = np.empty((6, n)), np.empty(n), np.empty((w, n)), np.empty(w)
     for row in range(q.shape[0]):
-        given, held = output[row], out[row]
-        invert(kind, chain, damping, q[row], given[n * (w + 1) :], jacobian, metric, products)
+        outputs, gains = output[row], out[row]
+        invert(kind, chain, damping, q[row], outputs[n * (w + 1) :], jacobian, metric, products)
         for a in range(w):  # J h, the motion of the tool that h alone causes
             moved[a] = 0.0
             for j in range(n):
-                moved[a] += jacobian[a, j] * given[j * (w + 1) + w]
+                moved[a] += jacobian[a, j] * outputs[j * (w + 1) + w]
         for j in range(n):
-            own = j * (w + 1)
-            held[own + w] = given[own + w]
+            first = j * (w + 1)
+            gains[first + w] = outputs[first + w]
             for a in range(w):
-                held[own + a] = given[own + a] + metric[j] * products[a, j]
-                held[own + w] -= held[own + a] * moved[a]
+                gains[first + a] = outputs[first + a] + metric[j] * products[a, j]
+                gains[first + w] -= gains[first + a] * moved[a]
 
 
 @inner
@@ -119,11 +119,11 @@ def action_rows(scene, velocity_limit, q, pose, nominal, output, out):
         if turned:  # seen from the frame of joint 1
             turn(axis, -q[row, 0], due)
         for j in range(n):
-            out[row, j] = commanded(output[row], j, due, speed, dt) / velocity_limit[j]
+            out[row, j] = joint_command(output[row], j, due, speed, dt) / velocity_limit[j]
 
 
 @inlined
-def commanded(output, j, due, speed, dt):
+def joint_command(output, j, due, speed, dt):
     """The velocity command of joint ``j``: row j of G times the remaining twist, plus h_j s."""
     w = due.shape[0]
     velocity = output[j * (w + 1) + w] * speed
@@ -138,7 +138,7 @@ def law_rows(scene, damping, velocity_limit, network, batch, interval, held, lef
 
     Args:
         scene: Kind of task coordinates, the arm, Δt in [s], and the offsets.
-        damping: See :func:`held_rows`.
+        damping: See :func:`gain_rows`.
         velocity_limit: Shape (n,).
         network: The first five arguments of :func:`baselines.agents.network.forward_rows`.
         batch: q, q̇, pose, reference at the offsets and steps left. Shape (B, …).
@@ -155,10 +155,10 @@ def law_rows(scene, damping, velocity_limit, network, batch, interval, held, lef
     for row in range(q.shape[0]):
         if left[row] == 0:
             left[row] = interval
-            own = slice(row, row + 1)
-            feature_rows(kind, chain, dt, offsets, q[own], nominal[own], remaining[own], features, speed)
+            one = slice(row, row + 1)
+            feature_rows(kind, chain, dt, offsets, q[one], nominal[one], remaining[one], features, speed)
             forward_rows(weights, biases, sizes, activation, squash, features, output)
             metric_rows(kind, chain.prismatic, offsets.shape[0] - 1, features, output)
-            held_rows(kind, chain, damping, q[own], output, held[own])
+            gain_rows(kind, chain, damping, q[one], output, held[one])
         left[row] -= 1
     action_rows(scene, velocity_limit, q, pose, nominal, held, out)

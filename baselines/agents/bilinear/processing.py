@@ -83,8 +83,7 @@ class Bilinear(Processing):
         ahead.flags.writeable = False
         damping = number("damping", self.damping, above=0.0)
         interval = whole_number("interval", self.interval, at_least=1)
-        for field, value in {"offsets": offsets, "damping": damping, "interval": interval, "_ahead": ahead}.items():
-            object.__setattr__(self, field, value)
+        self._settle(offsets=offsets, damping=damping, interval=interval, _ahead=ahead)
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
@@ -110,9 +109,9 @@ class Bilinear(Processing):
         """
         if problem.task.kind == task_kernels.SKEW:
             raise InvalidInputError("task: expected another than skew coordinates, whose errors are no twists.")
-        return self.held(problem) + 1 + problem.model.joints
+        return self.held_size(problem) + 1 + problem.model.joints
 
-    def held(self, problem: Problem) -> int:
+    def held_size(self, problem: Problem) -> int:
         """The number of values that are held between evaluations of the network: those of G and h."""
         return problem.model.joints * (int(twist_size(problem.task.kind)) + 1)
 

@@ -190,7 +190,7 @@ def _train_by_rewards(command: ByRewards) -> int:
             locks.enter_context(locked(folder))
             check_writable(folder)
         for seed, folder in runs.items():
-            there = rewards.finished(command.config, seed, folder)
+            there = rewards.read_finished(command.config, seed, folder)
             about = there or rewards.train(command.config, seed, folder)
             score = f"score {about['validation_score']:.3f} after {about['steps']} steps"
             print(f"seed {seed}: {score}{', already there' if there else ''}", flush=True)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.kernels import commanded
+from baselines.agents.bilinear.kernels import joint_command
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import P_X_INSIDE
@@ -95,7 +95,7 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
     for row in range(start, stop):
         lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
         into[:] = 0.0
-        look(chain, kind, q_path[row, steps[row]], place)
+        fill_kinematics(chain, kind, q_path[row, steps[row]], place)
         for t in range(steps[row] - 1, -1, -1):
             target, weight = nominal[row, t], by_cost[row] if counted[row, t] else 0.0
             q, last, reached, applied = q_path[row, t], qdot_path[row, t], q_path[row, t + 1], qdot_path[row, t + 1]
@@ -105,34 +105,34 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
                     by_error[a] = weight * cost_kernels.gradient(error[a], cost.delta_x, P_X_INSIDE, cost.p_x)
                 for j in range(n):
                     mu[j] += weight * cost_kernels.gradient(applied[j], cost.delta_qdot, cost.p_in, cost.p_out)
-                through_error(kind, target, place, error[:e], by_error[:e], lambda_)
-            look(chain, kind, q, place)
+                add_error_gradient(kind, target, place, error[:e], by_error[:e], lambda_)
+            fill_kinematics(chain, kind, q, place)
             twist(kind, target, pose, error, due)
             if turned:
                 turn(axis, -q[0], due)
             by_due[:] = 0.0
             for j in range(n):
-                command = commanded(output[row], j, due, speed[row], dt)
+                command = joint_command(output[row], j, due, speed[row], dt)
                 move, by = (last[j], q[j], reached[j]), (lambda_[j], mu[j])
-                by_command, lambda_[j], mu[j] = unlimited(limits, velocity_limit, j, command, move, by, dt)
-                through_law(output[row], j, by_command, due, speed[row], dt, into, by_due)
+                by_command, lambda_[j], mu[j] = limits_gradient(limits, velocity_limit, j, command, move, by, dt)
+                add_law_gradient(output[row], j, by_command, due, speed[row], dt, into, by_due)
             if turned:
                 lambda_[0] += turn_gradient(axis, due, by_due)
                 turn(axis, q[0], by_due)
             error_gradient(kind, target, by_due, by_error[:size])
             task_kernels.error(of_twist, target, pose, error[:size])
-            through_error(of_twist, target, place, error[:size], by_error[:size], lambda_)
+            add_error_gradient(of_twist, target, place, error[:size], by_error[:size], lambda_)
 
 
 @uncounted
-def look(chain, kind, q, place):
+def fill_kinematics(chain, kind, q, place):
     """Fills a :class:`Kinematics` at some joint coordinates of shape (n,)."""
     forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
     task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
 
 
 @uncounted
-def through_error(kind, target, place, error, by_error, lambda_):
+def add_error_gradient(kind, target, place, error, by_error, lambda_):
     """Adds the gradient through the error of the task to that with respect to the joint coordinates.
 
     Args:
@@ -153,7 +153,7 @@ def through_error(kind, target, place, error, by_error, lambda_):
 
 
 @inlined
-def through_law(output, j, by_command, due, speed, dt, into, by_due):
+def add_law_gradient(output, j, by_command, due, speed, dt, into, by_due):
     """Adds the gradient through the command of a joint to those with respect to (G, h) and the twist that is due.
 
     Args:
@@ -167,15 +167,15 @@ def through_law(output, j, by_command, due, speed, dt, into, by_due):
         by_due: The gradient with respect to the twist. Shape (w,).
     """
     w, scaled = due.shape[0], by_command / dt
-    own = j * (w + 1)
+    first = j * (w + 1)
     for a in range(w):
-        into[own + a] += scaled * due[a]
-        by_due[a] += scaled * output[own + a]
-    into[own + w] += by_command * speed
+        into[first + a] += scaled * due[a]
+        by_due[a] += scaled * output[first + a]
+    into[first + w] += by_command * speed
 
 
 @inlined
-def unlimited(limits, velocity_limit, j, command, move, by, dt):
+def limits_gradient(limits, velocity_limit, j, command, move, by, dt):
     """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.plant.step.step`.
 
     Args:
@@ -201,8 +201,8 @@ def unlimited(limits, velocity_limit, j, command, move, by, dt):
     accelerates = abs(allowed - last) <= limits[CHANGE, j]
     velocity = allowed if accelerates else last + within(allowed - last, limits[CHANGE, j])
     if not limits[LOWER, j] <= here + dt * velocity <= limits[UPPER, j]:
-        stands = abs(reached - here) / dt <= limits[FASTEST, j]
-        return 0.0, (-mu / dt if stands else 0.0), by_last
+        at_rest = abs(reached - here) / dt <= limits[FASTEST, j]
+        return 0.0, (-mu / dt if at_rest else 0.0), by_last
     by_velocity = dt * lambda_ + mu
     if not accelerates:
         return 0.0, lambda_, by_velocity

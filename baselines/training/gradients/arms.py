@@ -1,4 +1,4 @@
-"""N arms, each in an episode of its own, between segments."""
+"""N arms, each in its episode, between segments."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAST = 1e-3
 
 
 class Arms:
-    """N arms, each in an episode of its own, with their reference trajectories.
+    """N arms, each in its episode, with its reference trajectory.
 
     Args:
         scenario: The scenario.

@@ -22,7 +22,7 @@ from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-#: Smallest number of rows for a thread of their own.
+#: Smallest number of rows of a thread.
 GRAIN = 32
 
 
@@ -77,7 +77,7 @@ class Law:
         in_chunks(work, len(out), GRAIN)
         return torch.from_numpy(out), speed
 
-    def held(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
+    def gains(self, q: Tensor, features: Tensor, output: Tensor) -> Tensor:
         """(G, h) from the output of the network, as :func:`baselines.agents.bilinear.kernels.held_rows` gives them.
 
         Args:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.agents.bilinear.kernels import commanded
+from baselines.agents.bilinear.kernels import joint_command
 from ikgym.arms.limits import limit_rows
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
@@ -121,7 +121,7 @@ def segment(task, rows, output, path, start, stop):
             if turned:
                 turn(axis, -q[0], due)
             for j in range(n):
-                command = commanded(output[row], j, due, speed[row], dt)
+                command = joint_command(output[row], j, due, speed[row], dt)
                 applied[j] = within(command, velocity_limit[j])
                 if limited:
                     applied[j] = driven(limits, j, applied[j], qdot[j], 0.0, held, 0)

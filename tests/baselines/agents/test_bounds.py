@@ -5,10 +5,9 @@ import itertools
 import numpy as np
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.bounds import keep_rows
 from baselines.agents.files import agent_of
 from baselines.agents.network import Network
-from baselines.agents.policy import Agent
+from baselines.agents.policy import Agent, keep_rows
 from baselines.episodes import rollouts
 from baselines.policy import Problem
 from baselines.solvers.quadratic_program.limits import limits_with_braking

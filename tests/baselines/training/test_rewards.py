@@ -21,7 +21,7 @@ from baselines.cli.commands.train import main
 from baselines.files import locked
 from baselines.training.options import Rewards
 from baselines.training.rewards import make, train
-from baselines.training.zoo import ALGORITHMS, OTHERS, arguments, read
+from baselines.training.zoo import ALGORITHMS, OTHERS, arguments, read_settings
 from ikgym import files, rl
 from ikgym.exceptions import IkgymError
 from ikgym.sb3 import make_vec
@@ -59,7 +59,7 @@ def test_the_published_settings_have_an_entry_for_each_environment(algorithm):
     small = {"n_envs": 1, "buffer_size": 10} if algorithm in ("sac", "td3") else {}
     for env in ONLY.get(algorithm, rl.IDS):
         config = options(algorithm, env=env)
-        found = read(config)
+        found = read_settings(config)
         assert found["n_timesteps"] > 0
         assert model_of(algorithm, {**found, **small}, env).gamma == found["gamma"]
 
@@ -209,7 +209,7 @@ def test_mistakes_are_named(words, message, settings, tmp_path, capsys):
 def test_other_files_of_settings_are_refused(content, message, tmp_path):
     (tmp_path / "mine.yml").write_text(content, encoding="utf-8")
     with pytest.raises(IkgymError, match=message):
-        read(options("ppo", settings=tmp_path / "mine.yml"))
+        read_settings(options("ppo", settings=tmp_path / "mine.yml"))
 
 
 @pytest.mark.parametrize(("algorithm", "setting", "message"), [

@@ -44,7 +44,7 @@ def features(problem, batch, speed=None):
 
 def outputs(problem, seed=1):
     """G and h."""
-    size = ROWS, Bilinear(OFFSETS).held(problem)
+    size = ROWS, Bilinear(OFFSETS).held_size(problem)
     return np.random.default_rng(seed).normal(size=size).astype(np.float32)
 
 
@@ -105,7 +105,7 @@ def test_the_inverse_jacobian_removes_the_error(task):
     target = problem.task.coordinates(*arm.forward(near))
     batch = batch._replace(nominal=np.stack([target] * 3, 1))
     c, s = np.cos(batch.q[:, 0]), np.sin(batch.q[:, 0])
-    jacobian = arm.jacobian(batch.q)[:, : Bilinear(OFFSETS).held(problem) // arm.joints - 1]
+    jacobian = arm.jacobian(batch.q)[:, : Bilinear(OFFSETS).held_size(problem) // arm.joints - 1]
     axis, zero = arm.chain.axes[0], np.zeros(ROWS)
     assert axis.tolist() == [0.0, 0.0, 1.0]
     back = np.moveaxis(np.array([[c, s, zero], [-s, c, zero], [zero, zero, zero + 1.0]]), 2, 0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.agents.bilinear.features import FARTHEST, metric_rows, rate_rows
-from baselines.agents.bilinear.kernels import held_rows
+from baselines.agents.bilinear.kernels import gain_rows
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.network import Network
 from ikgym.rl.twists import twist
@@ -18,8 +18,8 @@ CASES = [("varga7", "pose"), ("varga7", "position"), ("puma560", "matrix"), ("ti
 
 
 def held(problem, q, output):
-    out = np.empty((len(q), DAMPED.held(problem)))
-    held_rows(problem.task.kind, problem.model.chain, DAMPING, q, output, out)
+    out = np.empty((len(q), DAMPED.held_size(problem)))
+    gain_rows(problem.task.kind, problem.model.chain, DAMPING, q, output, out)
     return out
 
 
@@ -130,9 +130,9 @@ def test_one_call_is_the_parts_of_the_law(arm, task):
     batch, kind, chain = batch_of(problem), problem.task.kind, problem.model.chain
     net = network((DAMPED.size(problem), 16, DAMPED.outputs(problem)))
     seen = features(problem, batch)
-    output, held = net.forward(seen), np.empty((ROWS, DAMPED.held(problem)))
+    output, held = net.forward(seen), np.empty((ROWS, DAMPED.held_size(problem)))
     metric_rows(kind, chain.prismatic, TWISTS, seen, output)
-    held_rows(kind, chain, DAMPED.damping, batch.q, output, held)
+    gain_rows(kind, chain, DAMPED.damping, batch.q, output, held)
     found = DAMPED.act(problem, batch, net, 1, nothing_held(DAMPED, problem, ROWS))
     np.testing.assert_allclose(found, qdot(problem, batch, held) / problem.velocity_limit, rtol=1e-15)
     assert np.ptp(found) > 0.0

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from baselines.agents.bilinear.features import feature_rows, metric_rows
-from baselines.agents.bilinear.kernels import LARGEST, held_rows
+from baselines.agents.bilinear.kernels import LARGEST, gain_rows
 from baselines.agents.bilinear.processing import Bilinear
 from baselines.policy import Problem
 from baselines.training.gradients.law import Law
@@ -42,15 +42,15 @@ def test_it_is_the_law_of_the_agent(case):
     np.testing.assert_array_equal(seen, features)
     np.testing.assert_array_equal(speed, speeds)
     assert not seen.requires_grad
-    given, wanted = output.detach().numpy().copy(), np.empty((ROWS, DAMPED.held(problem)))
+    given, wanted = output.detach().numpy().copy(), np.empty((ROWS, DAMPED.held_size(problem)))
     metric_rows(kind, chain.prismatic, len(OFFSETS) - 1, features, given)
-    held_rows(kind, chain, DAMPED.damping, batch.q, given, wanted)
-    np.testing.assert_allclose(law.held(q, seen, output).detach(), wanted, rtol=1e-9, atol=1e-9)
+    gain_rows(kind, chain, DAMPED.damping, batch.q, given, wanted)
+    np.testing.assert_allclose(law.gains(q, seen, output).detach(), wanted, rtol=1e-9, atol=1e-9)
 
 
 def test_gradients(case):
     law, _, _, (q, seen, output), _ = case
-    assert torch.autograd.gradcheck(lambda q, output: law.held(q, seen, output), (q, output), atol=1e-5, rtol=1e-4)
+    assert torch.autograd.gradcheck(lambda q, output: law.gains(q, seen, output), (q, output), atol=1e-5, rtol=1e-4)
 
 
 def test_what_is_cut_has_no_gradient(case):
@@ -58,6 +58,6 @@ def test_what_is_cut_has_no_gradient(case):
     n = problem.model.joints
     far = output.detach().clone()
     far[:, -1 - n :] = 10.0 * LARGEST
-    law.held(q, seen, far.requires_grad_()).sum().backward()
+    law.gains(q, seen, far.requires_grad_()).sum().backward()
     assert not far.grad[:, -1 - n :].any()
     assert torch.isfinite(q.grad).all()
