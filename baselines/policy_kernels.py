@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.status import Status
+from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import Chain
-from ikgym.kernels.limits import ideal
+from ikgym.kernels.limits import CHANGE, ideal
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -23,6 +24,8 @@ _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 #: Result of a step's kernel for observations that are not finite; otherwise that of :func:`cut_rows`.
 REFUSED = 2
 
+# The row of :attr:`Model.limits` behind those of an arm.
+BRAKING = CHANGE + 1
 # The bits of the exponent: all of them are set in infinities and in NaN, and nowhere else.
 _EXPONENT = 0x7FF0000000000000
 
@@ -44,25 +47,25 @@ def all_finite(q, qdot, pose, nominal, remaining):
 
 
 class Model(NamedTuple):
-    """The model of the arm, the task and the limits, as the kernels of solvers see them.
+    """The model of the arm, the task, the cost and the limits, as the kernels of all solvers see them.
 
     Attributes:
         chain: The model of the arm.
         kind: The kind of task coordinates, one of those of :mod:`ikgym.kernels.tasks`.
+        cost: The parameters of the stage cost.
         dt: Δt in [s].
-        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
-        lower: Least joint coordinates in [rad] or [m]. Shape (n,).
-        upper: Largest joint coordinates in [rad] or [m]. Shape (n,).
-        largest: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
+        velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
+        limits: Least and largest joint coordinates in [rad] or [m], then in [rad/s] or [m/s] the largest velocities,
+            their largest changes in one step, and those that braking may use; infinite where there is no limit. The
+            rows are LOWER, UPPER, FASTEST and CHANGE of :mod:`ikgym.kernels.limits`, and BRAKING. Shape (5, n).
     """
 
     chain: Chain
     kind: int
+    cost: CostParameters
     dt: float
-    unit: Floats
-    lower: Floats
-    upper: Floats
-    largest: Floats
+    velocity_limit: Floats
+    limits: Floats
 
 
 class Seen(NamedTuple):
@@ -101,16 +104,10 @@ class NoMemory(NamedTuple):
     """The memory of a solver without one."""
 
 
-def model_block(chain: Chain, kind: int, dt: float, *limits: Floats) -> Floats:
-    """A :class:`Model` as one read-only block of numbers, since each array costs a call from Python 0.15 µs.
-
-    Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        dt: Δt in [s].
-        *limits: The other fields of :class:`Model`, in their order. Shapes (n,).
-    """
-    block = np.concatenate([[len(chain.axes), kind, dt], *limits, *map(np.ravel, chain)])
+def model_block(model: Model) -> Floats:
+    """A :class:`Model` as one read-only block of numbers, since each array costs a call from Python 0.15 µs."""
+    head = [len(model.velocity_limit), model.kind, model.dt, *model.cost]
+    block = np.concatenate([head, model.velocity_limit, model.limits.ravel(), *map(np.ravel, model.chain)])
     block.flags.writeable = False
     return block
 
@@ -119,23 +116,17 @@ def model_block(chain: Chain, kind: int, dt: float, *limits: Floats) -> Floats:
 def model_of(block):
     """The :class:`Model` in a block from :func:`model_block`."""
     n = int(block[0])
-    axes, prismatic, tool, rotation = 3 + 7 * n, 3 + 10 * n, 3 + 11 * n, 6 + 11 * n
+    limits, offsets = 8 + n, 8 + 6 * n
+    axes, prismatic, tool, rotation = offsets + 3 * n, offsets + 6 * n, offsets + 7 * n, offsets + 7 * n + 3
     chain = Chain(
-        block[3 + 4 * n : axes].reshape(n, 3),
+        block[offsets:axes].reshape(n, 3),
         block[axes:prismatic].reshape(n, 3),
         block[prismatic:tool] != 0.0,
         block[tool:rotation],
-        block[rotation : rotation + 9].reshape(3, 3),
+        block[rotation:].reshape(3, 3),
     )
-    return Model(
-        chain,
-        int(block[1]),
-        block[2],
-        block[3 : 3 + n],
-        block[3 + n : 3 + 2 * n],
-        block[3 + 2 * n : 3 + 3 * n],
-        block[3 + 3 * n : 3 + 4 * n],
-    )
+    cost = CostParameters(block[3], block[4], block[5], block[6], block[7])
+    return Model(chain, int(block[1]), cost, block[2], block[8:limits], block[limits:offsets].reshape(5, n))
 
 
 def parts_of(answer: Any, rows: int, n: int) -> tuple[Any, Any, Any]:
@@ -191,28 +182,26 @@ def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, actio
     step(model, Numbers(*numbers), shown, Memory(*memory), out)  # type: ignore[name-defined]  # noqa: F821
     if action.shape[0] == 0:
         return False
-    result = cut_rows(out.qdot, model.unit, action.reshape(rows, n), out.status)
+    result = cut_rows(out.qdot, model.velocity_limit, action.reshape(rows, n), out.status)
     if remembers:  # type: ignore[name-defined]  # noqa: F821
-        limits = block[15 + 11 * n :].reshape((block.shape[0] - 15) // n - 11, n)
-        sent_rows(limits, model.dt, model.unit, shown.q, action.reshape(rows, n), shown.qdot)
+        sent_rows(model, shown.q, action.reshape(rows, n), shown.qdot)
     return result
 
 
 @kernel
-def sent_rows(limits, dt, unit, q, action, last):
+def sent_rows(model, q, action, last):
     """The joint velocities that an ideal arm within the limits makes of actions, row by row.
 
     Args:
-        limits: See :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
-        dt: Δt in [s].
-        unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
+        model: The :class:`Model`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         action: Shape (B, n).
         last: Velocities of the step before in [rad/s] or [m/s]; becomes those of this one. Shape (B, n).
     """
+    limits, limit, dt = model.limits, model.velocity_limit, model.dt
     for row in range(q.shape[0]):
         for j in range(q.shape[1]):
-            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * unit[j], last[row, j], dt)
+            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * limit[j], last[row, j], dt)
 
 
 @kernel

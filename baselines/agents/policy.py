@@ -15,7 +15,6 @@ from baselines.agents.processing import Held
 from baselines.files import ResultsError
 from baselines.fingerprints import arm_fingerprint
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.wrappers import full_orientation
 from ikgym.exceptions import InvalidInputError
@@ -95,7 +94,7 @@ class LearnedPolicy(SolverPolicy):
             )
         trained = processing.interval
         steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
-        limits = limits_with_braking(seen) if processing.bounded and seen.model.limited else None
+        limits = seen.limits if processing.bounded and seen.model.limited else None
         for field, value in {"file": file, "seen": seen, "limits": limits, "interval": steps}.items():
             object.__setattr__(self, field, value)
 
@@ -262,7 +261,7 @@ def keep_rows(limits, dt, velocity_limit, q, last, action):
     """Bounds actions, row by row, as those of the policy `qp`: a joint brakes ahead of its stop. NaN stays NaN.
 
     Args:
-        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (5, n).
         dt: Δt in [s].
         velocity_limit: Shape (n,).
         q: Shape (B, n).

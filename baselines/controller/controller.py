@@ -17,7 +17,6 @@ from baselines.controller.reference import Pose, coordinates, coordinates_ahead,
 from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import remembered
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.spec import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
@@ -92,7 +91,7 @@ class Controller:
         self._steps = None if steps is None else whole_number("steps", steps, at_least=1)
         self._given = drives if isinstance(drives, Drives) else None
         problem = self._problem = self.policy.problem
-        self._limits = limits_with_braking(problem)
+        self._limits = problem.limits
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         delay = LONGEST if self._given is None else math.ceil(np.max(self._given.delay))
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)

@@ -90,7 +90,7 @@ def command(limits, q, action, unit, last, dt, kept, out):
     """The joint velocities that limits make of an action.
 
     Args:
-        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (5, n).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         action: Shape (n,).
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).

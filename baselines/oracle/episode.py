@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from baselines.episodes import Simulation, rollouts
-from baselines.policy import SolverPolicy
+from baselines.policy import Problem, SolverPolicy
 from baselines.policy.surroundings import swept
+from baselines.policy_kernels import Model
 from baselines.recording import add_up
-from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
@@ -46,7 +46,7 @@ class EpisodeProblem:
 
     scenario: Scenario
     seed: int
-    data: ProblemData
+    data: Model
     start: FloatArray
     nominal: FloatArray
     grid: Grid
@@ -79,22 +79,14 @@ class EpisodeProblem:
                 f"{scenario.name!r}: expected iterations_per_point=1 with the limits of acceleration of arm "
                 f"{scenario.arm.name!r}, got {scenario.iterations_per_point}."
             )
-        data = ProblemData(
-            scenario.arm.chain,
-            scenario.task.kind,
-            scenario.cost.parameters,
-            scenario.dt,
-            scenario.arm.lower,
-            scenario.arm.upper,
-            read_only(scenario.largest_qdot),
-        )
+        arm = Problem(scenario.arm, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit)
         at = np.flatnonzero(scenario.counted())
         held = np.diff(at, prepend=0)
         grid = Grid(at, np.maximum(held - 1.0, 1.0), np.ones(len(at)), (held == 1).astype(np.float64))
         trajectory = scenario.trajectory.sample(seeding.np_random(seed)[0])
         start = np.array(scenario.first_q(trajectory), dtype=np.float64)
         nominal = np.ascontiguousarray(scenario.nominal(seed)[1:])
-        return cls(scenario, seed, data, start, nominal, grid, _clearance(scenario, seed))
+        return cls(scenario, seed, arm.kernel_model, start, nominal, grid, _clearance(scenario, seed))
 
     def on(self, grid: Grid) -> PathProblem:
         """The problem on a grid, as the kernels see it."""

@@ -12,13 +12,13 @@ import numpy.typing as npt
 
 from baselines.policy.arguments import Parts, not_finite
 from baselines.policy.fields import kernel_fields, named_tuple
-from baselines.policy.problem import Batch, Memory, Problem, Solution
+from baselines.policy.problem import Batch, Memory, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy.surroundings import surroundings_of
-from baselines.policy_kernels import REFUSED, NoMemory, entry, model_block, parts_of
+from baselines.policy_kernels import REFUSED, NoMemory, entry, parts_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
-from ikgym.validation import FloatArray, read_only
+from ikgym.validation import FloatArray
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
@@ -132,7 +132,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         numbers: tuple[Any, ...] = self.numbers()
         step = type(self).step_among if among else type(self).step
         call = _entry(step, type(numbers), type(self._example), self.remembers_command)
-        block, kept = _block(self.problem, self.remembers_command), tuple(numbers)
+        block, kept = self.problem.kernel_block, tuple(numbers)
         if call not in compiled_classes:
             with self._first_call():
                 compiled_classes.add(call)
@@ -144,12 +144,3 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
 
 #: One compiled call for each kernel and the types of its arguments.
 _entry = functools.cache(entry)
-
-
-@functools.lru_cache(64)  # problems are frozen, and shared by many policies
-def _block(problem: Problem, limited: bool) -> FloatArray:
-    """The model as one block, with the limits of an ideal arm behind it where commands are remembered."""
-    model = problem.model
-    limits = problem.velocity_limit, model.lower, model.upper, problem.largest_qdot
-    block = model_block(model.chain, problem.task.kind, problem.dt, *limits)
-    return read_only(np.append(block, problem.limit_rows)) if limited else block

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy_kernels import Model, model_block, model_of
 from ikgym.arms import Arm
-from ikgym.arms.limits import limit_rows
 from ikgym.cost import TrackingCost
 from ikgym.frozen import Frozen
 from ikgym.kernels.bodies import Surroundings
@@ -19,6 +19,8 @@ from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
 from ikgym.validation import FloatArray, frozen_array, read_only
 
+# Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
+ROUNDING = 2.0**-24
 #: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
 Memory = tuple[npt.NDArray[Any], ...]
 
@@ -54,9 +56,27 @@ class Problem(Frozen):
         return np.minimum(self.velocity_limit, self.model.velocity_limit)
 
     @functools.cached_property
-    def limit_rows(self) -> FloatArray:
-        """The limits of an ideal arm of this model, see :func:`ikgym.arms.limits.limit_rows`. Shape (4 or 0, n)."""
-        return read_only(limit_rows(self.model, self.largest_qdot, self.dt))
+    def limits(self) -> FloatArray:
+        """The limits as kernels take them, see :class:`baselines.policy_kernels.Model`. Shape (5, n).
+
+        Braking may use a little less than the acceleration limit: a joint that brakes as hard as it can cannot make up
+        for the rounding of its actions, and would touch its stop.
+        """
+        change = self.dt * self.model.acceleration_limit
+        braking = np.maximum(change - 2.0 * ROUNDING * self.velocity_limit, 0.5 * change)
+        return read_only(np.array([self.model.lower, self.model.upper, self.largest_qdot, change, braking]))
+
+    @functools.cached_property
+    def kernel_block(self) -> FloatArray:
+        """:attr:`kernel_model` as one block, for calls that take microseconds."""
+        fixed = self.model.chain, self.task.kind, self.cost.parameters, self.dt
+        return model_block(Model(*fixed, self.velocity_limit, self.limits))
+
+    @functools.cached_property
+    def kernel_model(self) -> Model:
+        """Model, task, cost and limits as the kernels of all solvers take them."""
+        model: Model = model_of(self.kernel_block)  # of the types that the kernels behind `predict` are compiled for
+        return model
 
     def poses(self, q: FloatArray) -> FloatArray:
         """Task coordinates of the model at joint coordinates of shape (B, n). Shape (B, m)."""

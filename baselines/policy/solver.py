@@ -213,7 +213,7 @@ class SolverPolicy(Frozen, abc.ABC):
         action, status = np.empty(qdot.shape, np.float32), status.copy()
         lost = cut_rows(qdot, problem.velocity_limit, action, status)
         if self.remembers_command:
-            sent_rows(problem.limit_rows, problem.dt, problem.velocity_limit, batch.q, action, last)
+            sent_rows(problem.kernel_model, batch.q, action, last)
             kept = (*kept, last)
         if lost:
             kept = self._without_lost(kept, qdot)

@@ -57,7 +57,7 @@ def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
 
     Args:
-        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (5, n).
         dt: Δt in [s].
         wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
         q: Joint coordinates now and 1, 2, … steps ago, in [rad] or [m], changed in place. Shape (B, A, n).

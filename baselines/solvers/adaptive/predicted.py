@@ -23,7 +23,6 @@ from baselines.solvers.adaptive.drives import (
     start_memory,
 )
 from baselines.solvers.adaptive.following import Servo, follow_rows, move_rows
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant.checks import PerJoint, joint_numbers
@@ -171,13 +170,13 @@ class Predicted(NamedWrapper):
 
     @functools.cached_property
     def _limits(self) -> tuple[FloatArray, tuple[object, ...]]:
-        """The limits of the arm, see :func:`limits_with_braking`, and a plain :class:`Servo`."""
+        """The limits of the arm, see :attr:`Problem.limits`, and a plain :class:`Servo`."""
         problem, model = self.problem, self.problem.model
         change = np.array(model.acceleration_limit * problem.dt)
         overdrive = math.inf if self.overdrive is None else self.overdrive
         unit, largest = np.array(problem.velocity_limit), np.array(problem.largest_qdot)
         servo = Servo(self.gain, problem.dt, unit, largest, change, overdrive)
-        return limits_with_braking(self.inner.problem), tuple(servo)
+        return self.inner.problem.limits, tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
         """Takes in the measurements, and tells how far the arm is from where the drives should have brought it."""

@@ -80,7 +80,7 @@ def fixed_point_step(model, numbers, seen, memory, answer):
         # Further off than at the start, and further away than the drives can go.
         if not residual <= first:
             for j in range(n):
-                if not abs(here[j] - start[j]) <= model.unit[j] * dt:
+                if not abs(here[j] - start[j]) <= model.velocity_limit[j] * dt:
                     status[row] = _DIVERGED
         for j in range(n):
             here[j] = ((start[j] if status[row] == _DIVERGED else here[j]) - start[j]) / dt

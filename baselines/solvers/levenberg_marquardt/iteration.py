@@ -128,7 +128,7 @@ def iteration_step(model, numbers, seen, memory, answer):
                 break
         iterations[row] = i
         if not one_step and first_square > first:
-            stop_run_away(here, start, model.unit, dt, status[row : row + 1])
+            stop_run_away(here, start, model.velocity_limit, dt, status[row : row + 1])
         finish(dt, rule, row, start, status[row], memory, here)
 
 

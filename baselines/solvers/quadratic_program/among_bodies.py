@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from baselines.policy_kernels import BRAKING
 from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
-from baselines.solvers.quadratic_program.velocity_box import BRAKING, braking_speed
+from baselines.solvers.quadratic_program.velocity_box import braking_speed
 from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel, uncounted
@@ -72,7 +73,7 @@ def task_free(hessian, weight, projection):
 
 
 @uncounted
-def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
+def keep_clear(model, numbers, q, projection, count, near, motion, velocity):
     """Rows that keep pairs from touching, and joint velocities that lead away from them aside from the task.
 
     ∇dᵀ q̇ is at least minus :func:`largest_approach`. Motions in the null space begin early and
@@ -84,8 +85,8 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
     joint velocities, and less near a stop.
 
     Args:
+        model: The :class:`Model`.
         numbers: The fields of :class:`QuadraticProgram`.
-        dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         projection: P, see :func:`task_free`. Shape (n, n).
         count: How many rows there are.
@@ -98,7 +99,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         How much is left of other preferences: the smallest d / d*, at most 1.
     """
     distances, reaches, bounds, gradients = near
-    n, braking, nearest = velocity.shape[0], numbers.limits[BRAKING], 1.0
+    n, dt, braking, nearest = velocity.shape[0], model.dt, model.limits[BRAKING], 1.0
     for j in range(n):
         velocity[j] = 0.0
     for i in range(count):
@@ -119,7 +120,7 @@ def keep_clear(numbers, dt, q, projection, count, near, motion, velocity):
         for j in range(n):
             velocity[j] += amount * motion[j]
         nearest = min(nearest, distances[i] / reaches[i])
-    _moderate(numbers.limits, q, velocity)
+    _moderate(model.limits, q, velocity)
     return min(max(nearest, 0.0), 1.0)
 
 
@@ -161,7 +162,7 @@ def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
         preferred[j] = pull[0, j] * (pull[1, j] - q[j])
     weight = row_program(model, numbers, q, seen.qdot[row], jac, shift, error, preferred, program)
     task_free(hessian, weight, projection)
-    left = keep_clear(numbers, model.dt, q, projection, count, near, motion, away)
+    left = keep_clear(model, numbers, q, projection, count, near, motion, away)
     for j in range(q.shape[0]):
         away[j] -= (1.0 - left) * preferred[j]
         preferred[j] += away[j]

@@ -12,7 +12,6 @@ import numpy as np
 
 from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.arms.limits import middle
 from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
@@ -65,8 +64,6 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     weights: FloatArray = derived()
     #: Gains to the posture in [1/s], and the posture. Shape (2, n).
     pull: FloatArray = derived()
-    #: See :func:`limits_with_braking`. Shape (5, n).
-    limits: FloatArray = derived()
 
     keeps_acceleration: ClassVar[bool] = True
 
@@ -81,7 +78,6 @@ class VelocityProgram(ResolvedRate, abc.ABC):
             secondary_share=SECONDARY_SHARE if self.soft else math.inf,
             weights=self.weights_of(self.joint_weights),
             pull=read_only(np.array([gains, target])),
-            limits=limits_with_braking(self.problem),
         )
 
     def _posture(self) -> tuple[FloatArray, FloatArray]:

@@ -50,7 +50,7 @@ CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
 @kernel
 def path_step(model, numbers, seen, memory, answer):
     """One step of :class:`PathFollowing`; see :class:`CompiledPolicy` for the arguments."""
-    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, numbers.limits, numbers.pull
+    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, model.limits, numbers.pull
     n, e = q.shape[1], tasks.error_size(model.kind, seen.pose.shape[1])
     hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
     lower, upper, preferred, jac = np.empty(n + 1), np.empty(n + 1), np.empty(n), np.empty((e, n))

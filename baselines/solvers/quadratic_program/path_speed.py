@@ -36,7 +36,7 @@ def joint_path_ahead(model, numbers, samples, first, done, now, q, tangents):
     n, e, length = q.shape[0], done.shape[0], samples.shape[0]
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, move, way, ahead = np.empty((e, n)), np.empty(e), np.empty(e), q.copy()
-    hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), numbers.limits[FASTEST]
+    hessian, linear, rest, fastest = np.empty((n, n)), np.empty(n), np.zeros(n), model.limits[FASTEST]
     weights, stride = numbers.weights, numbers.stride
     for i in range(tangents.shape[0]):
         here = first + i * stride

@@ -218,7 +218,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         Weight of the joint motion.
     """
     hessian, linear, lower, upper = program
-    velocity_box(numbers.limits, model.dt, q, last, lower, upper)
+    velocity_box(model.limits, model.dt, q, last, lower, upper)
     if numbers.rotation_weight != 1.0:
         weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
     for a in range(error.shape[0]):
@@ -226,13 +226,13 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         for j in range(q.shape[0]):
             jacobian[a, j] *= model.dt
     weights, n, share = numbers.weights, q.shape[0], 1.0
-    weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, weights, numbers.limits[FASTEST])
+    weight = motion_weight(jacobian, error, numbers.damping, numbers.lm_damping, weights, model.limits[FASTEST])
     weight *= SCALING_WEIGHT if numbers.task_scaling else 1.0
     curvature(jacobian, weight, weights, hessian)
     factor = np.empty((n, n))
     definite = factorise(hessian, factor)
     if definite and numbers.braking > 0.0:
-        share = feedback_share(factor, jacobian, error, numbers.braking, numbers.limits[CHANGE])
+        share = feedback_share(factor, jacobian, error, numbers.braking, model.limits[CHANGE])
     if definite and numbers.secondary_share < math.inf:
         limit_secondary(factor, jacobian, motion, error, numbers.secondary_share, weight, weights, preferred)
     for a in range(error.shape[0]):

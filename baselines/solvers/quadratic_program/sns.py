@@ -11,7 +11,6 @@ import numpy as np
 from baselines.policy.fields import derived
 from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
@@ -96,7 +95,7 @@ def sns_step(model, numbers, seen, memory, answer):
     """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
     error *= numbers.gain
-    (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, numbers.limits, model.dt
+    (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, model.limits, model.dt
     reach, n = numbers.reach, q.shape[1]
     lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
     for row in range(q.shape[0]):
@@ -149,8 +148,6 @@ class SaturationInNullSpace(ResolvedRate):
     braking: float = derived()
     #: Roots of the inverse weights of the joints. Shape (n,).
     reach: FloatArray = derived()
-    #: See :func:`limits_with_braking`. Shape (5, n).
-    limits: FloatArray = derived()
 
     name: ClassVar[str] = "sns"
     keeps_acceleration: ClassVar[bool] = True
@@ -161,4 +158,4 @@ class SaturationInNullSpace(ResolvedRate):
         brakes = np.isfinite(self.problem.model.acceleration_limit).any()
         reach = read_only(1.0 / np.sqrt(self.weights_of(self.joint_weights)))
         braking = self.braking_share if brakes else 0.0
-        self._settle(reach=reach, braking=braking, limits=limits_with_braking(self.problem))
+        self._settle(reach=reach, braking=braking)

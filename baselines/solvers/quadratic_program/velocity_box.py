@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
+from baselines.policy_kernels import BRAKING
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
-
-# The row behind those of an arm's limits, see :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`.
-BRAKING = CHANGE + 1
 
 
 @inlined
@@ -44,7 +42,7 @@ def velocity_box(limits, dt, q, last, lower, upper):
     stop (of a model whose stops are not those of the arm) it is led back, and the opposite stop gives way.
 
     Args:
-        limits: See :func:`baselines.solvers.quadratic_program.limits.limits_with_braking`. Shape (5, n).
+        limits: See :class:`Model`. Shape (5, n).
         dt: Δt in [s].
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).

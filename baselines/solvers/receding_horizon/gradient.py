@@ -10,6 +10,7 @@ import numpy as np
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
 from baselines.policy.parameters import choice, parameter
+from baselines.policy_kernels import Model
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
@@ -21,9 +22,10 @@ from baselines.solvers.receding_horizon.descent import (
     stop_test,
     take_step,
 )
-from baselines.solvers.receding_horizon.horizon import ProblemData, analytic_gradient, difference_gradient
+from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
+from ikgym.kernels.limits import FASTEST
 from ikgym.validation import FloatArray, number, whole_number
 
 # Smaller ones drown in the rounding of the states, which they change by Δt times as much.
@@ -118,12 +120,8 @@ class RecedingHorizonGradient(SolverPolicy):
         return DescentMemory(plan, alpha)
 
     @functools.cached_property
-    def _constants(self) -> tuple[ProblemData, DescentSettings]:
+    def _constants(self) -> tuple[Model, DescentSettings]:
         """The arguments of the kernel that never change."""
-        problem, model = self.problem, self.problem.model
-        kind, cost = problem.task.kind, problem.cost.parameters
-        limits: tuple[Any, ...] = (model.lower, model.upper, problem.largest_qdot)
-        data = ProblemData(model.chain, kind, cost, problem.dt, *limits)
         settings = DescentSettings(
             tolerance=self.tolerance,
             steps=self.iterations,
@@ -132,7 +130,7 @@ class RecedingHorizonGradient(SolverPolicy):
             alpha_factor=self.alpha_factor,
             difference=self.difference if self.gradient == "finite_difference" else 0.0,
         )
-        return data, settings
+        return self.problem.kernel_model, settings
 
     def _descend(self) -> Any:
         """The kernel of the descent."""
@@ -148,7 +146,7 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
     """Gradient descent row by row.
 
     Args:
-        data: The :class:`ProblemData`.
+        data: The :class:`baselines.policy_kernels.Model`.
         settings: :class:`DescentSettings`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).
@@ -177,6 +175,6 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
             take_step(qdot, alpha[row], gradient)
             step += 1
         iterations[row] = step
-        status[row] = stop_if_diverged(status[row], value, first_value, data.velocity_limit, qdot)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.limits[FASTEST], qdot)
         if status[row] == DIVERGED:
             alpha[row] = settings.alpha_min

@@ -12,33 +12,10 @@ import numpy.typing as npt
 
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
-
-
-class ProblemData(NamedTuple):
-    """Arm, task, cost and limits: the same at all grid points and in all periods.
-
-    Attributes:
-        chain: The model of the arm.
-        kind: The kind of task coordinates, see :mod:`ikgym.kernels.tasks`.
-        cost: The cost's parameters.
-        dt: Δt in [s].
-        lower: Least joint coordinates in [rad] or [m], -inf where there is no limit. Shape (n,).
-        upper: Largest joint coordinates in [rad] or [m], inf where there is no limit. Shape (n,).
-        velocity_limit: Largest joint velocities in [rad/s] or [m/s]. Shape (n,).
-    """
-
-    chain: Chain
-    kind: int
-    cost: CostParameters
-    dt: float
-    lower: Floats
-    upper: Floats
-    velocity_limit: Floats
 
 
 @inner
@@ -46,7 +23,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences (Varga 2021, section IV), and Φ, the sum of the stage costs over the horizon.
 
     Args:
-        data: The :class:`ProblemData`; limits do not count.
+        data: The :class:`baselines.policy_kernels.Model`; limits do not count.
         q: Joint coordinates at the first grid point. Shape (n,).
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         qdot: Joint velocities, put back as they were. Shape (HL - 1, n).

@@ -32,6 +32,7 @@ from baselines.solvers.receding_horizon.task_constraints import (
     task_system,
 )
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.limits import FASTEST
 from ikgym.validation import flag
 
 
@@ -133,7 +134,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
             take_step(qdot, alpha[row], by_qdot)
             step += 1
         iterations[row] = step
-        status[row] = stop_if_diverged(status[row], value, first_value, data.velocity_limit, qdot)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.limits[FASTEST], qdot)
         if status[row] == DIVERGED:
             alpha[row] = settings.alpha_min
 

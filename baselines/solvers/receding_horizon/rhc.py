@@ -27,7 +27,7 @@ from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, pl
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
-from ikgym.validation import BoolArray, FloatArray, IntArray, flag, number, read_only, whole_number
+from ikgym.validation import FloatArray, IntArray, flag, number, read_only, whole_number
 
 # Range of the kernel's counters and random numbers.
 MOST = 2**31 - 1
@@ -117,8 +117,6 @@ class RecedingHorizon(CompiledPolicy):
 
     #: Steps from now to the knots. Shape (K,).
     offsets: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False)
-    #: Which joints are prismatic. Shape (n,).
-    prismatic: BoolArray = derived()
     #: The settings in two blocks, see :func:`plain_settings`.
     reals: FloatArray = derived()
     integers: IntArray = derived()
@@ -141,9 +139,9 @@ class RecedingHorizon(CompiledPolicy):
         given = {name: getattr(self, name) for name in PlanSettings._fields if name in self.parameters}
         given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
         settings = PlanSettings(**given)
-        reals, integers = plain_settings(problem.cost.parameters, settings)
+        reals, integers = plain_settings(settings)
         sweep = read_only(swept(model) if self.among_bodies else np.empty((0, model.joints)))
-        self._settle(offsets=knots, prismatic=model.chain.prismatic, reals=reals, integers=integers, sweep=sweep)
+        self._settle(offsets=knots, reals=reals, integers=integers, sweep=sweep)
 
     @property
     def interior_point(self) -> bool:
@@ -173,7 +171,7 @@ class RecedingHorizon(CompiledPolicy):
     @classmethod
     def kernel_fields(cls) -> tuple[str, ...]:
         """See :meth:`CompiledPolicy.kernel_fields`; most are in blocks, which are read faster."""
-        return "prismatic", "reals", "integers", "clearance", "sweep"
+        return "reals", "integers", "clearance", "sweep"
 
     def plan(self, state: Memory) -> FloatArray:
         """The plan behind a state that `predict` returned: joint coordinates at the knots :attr:`offsets` ahead.

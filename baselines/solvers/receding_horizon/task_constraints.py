@@ -80,7 +80,7 @@ def reduced_task_gradient(data, nominal, difference, x, system, gradient):
     """The reduced gradient by all unknowns, and Φ, infinite where the system of the multipliers cannot be solved.
 
     Args:
-        data: The :class:`baselines.solvers.receding_horizon.horizon.ProblemData`; limits do not count.
+        data: The :class:`baselines.policy_kernels.Model`; limits do not count.
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         difference: The finite difference δ of the velocities, 0 for analytic derivatives.
         x: :class:`Unknowns`.

@@ -10,7 +10,6 @@ from baselines.agents.network import Network
 from baselines.agents.policy import Agent, keep_rows
 from baselines.episodes import rollouts
 from baselines.policy import Problem
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym import scenarios, tasks
 
@@ -20,7 +19,7 @@ PANDA = scenarios.get("panda-random").replace(task=tasks.get("pose"), steps=300)
 def test_actions_are_kept_within_the_velocity_box():
     """Those outside come to its edge, those inside stay as they are, and what is no number stays none."""
     problem, rng = Problem.of(PANDA), np.random.default_rng(0)
-    arm, limits = problem.model, limits_with_braking(problem)
+    arm, limits = problem.model, problem.limits
     q = rng.uniform(arm.lower, arm.upper, (200, 7))
     last = rng.uniform(-0.3, 0.3, (200, 7))
     asked = rng.uniform(-1.2, 1.2, (200, 7))

@@ -8,9 +8,9 @@ import baselines
 import ikgym
 from baselines.controller import Drives
 from baselines.episodes import rollouts
+from baselines.policy import Problem
 from baselines.policy_kernels import sent_rows
 from ikgym import machine
-from ikgym.arms.limits import limit_rows
 from ikgym.simulator import Simulator
 from tests.comparison import identical
 
@@ -78,11 +78,11 @@ def test_the_remembered_command_is_that_of_an_ideal_plant(name):
     low, high = np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)
     starts = np.where(rng.random((rows, n)) < 0.5, high - 1e-4, low + rng.random((rows, n)) * (high - low))
     simulator.reset(np.ones(rows, bool), [np.random.default_rng(k) for k in range(rows)], starts=starts)
-    last, limits = np.zeros((rows, n)), limit_rows(arm, scenario.largest_qdot, scenario.dt)
+    last, model = np.zeros((rows, n)), Problem.of(scenario).kernel_model
     for _ in range(20):
         q = simulator.observe().q.copy()
         action = np.abs(rng.uniform(-1, 1, (rows, n))).astype(np.float32)
-        sent_rows(limits, scenario.dt, np.array(scenario.velocity_limit), q, action, last)
+        sent_rows(model, q, action, last)
         assert identical(last, simulator.step(action).qdot)
 
 

@@ -25,6 +25,7 @@ from baselines.solvers.receding_horizon.newton.workspace import joints_at
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 # Origin of the multipliers: from the gradients of the barriers, as they are, or by a step of this length at most.
 ANEW, KEPT = -1.0, 0.0
@@ -48,7 +49,7 @@ def merit(problem, path, barrier, workspace):
     data, grid, start = problem.data, problem.grid, problem.start
     cost, dt, mu, weight = data.cost, data.dt, barrier.mu, barrier.limit_weight
     lengths, tracking, velocities = grid.length, grid.tracking, grid.velocity
-    limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
+    lower, upper, limits, changes = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST], problem.change_limit
     errors, before = tracking_errors(problem, path, workspace), workspace.before
     (knots, n), e, steepness = path.shape, errors.shape[1], kink_steepness(cost)
     total = 0.0
@@ -148,7 +149,7 @@ def _add_motion(problem, path, barrier, advance, workspace):
     """Adds the velocity costs and the limits of velocity, acceleration and position; gives their value."""
     data, start, cost, dt = problem.data, problem.start, problem.data.cost, problem.data.dt
     lengths, velocities, braking = problem.grid.length, problem.grid.velocity, problem.braking
-    limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
+    lower, upper, limits, changes = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST], problem.change_limit
     model, barriers, before = workspace.model, workspace.barriers, workspace.before
     gradient, diagonal, coupling, far = model.gradient, model.diagonal, model.coupling, model.far
     weight, mu = barrier.limit_weight, barrier.mu

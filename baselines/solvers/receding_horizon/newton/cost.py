@@ -23,6 +23,7 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import P_X_INSIDE
 from ikgym.kernels.jit import expanded, inlined, uncounted
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 # All loops take their arrays out of the tuples first: numba counts references at each access, which costs more than the
 # kinematics do.
@@ -140,7 +141,7 @@ def merit(problem, path, multipliers, workspace):
     """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers."""
     data, grid, start = problem.data, problem.grid, problem.start
     cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
-    limits, lower, upper = data.velocity_limit, data.lower, data.upper
+    lower, upper, limits = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST]
     factor = workspace.knot.penalty_factor[0]
     errors = tracking_errors(problem, path, workspace)
     e, n = errors.shape[1], path.shape[1]
@@ -186,7 +187,7 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
     knot, model = workspace.knot, workspace.model
     rotation, position, geometric, pose = knot.rotation, knot.position, knot.geometric, knot.pose
     error, jacobian, error_jacobian, by_error = knot.error, knot.jacobian, knot.error_jacobian, knot.gradient
-    limits, lower, upper = data.velocity_limit, data.lower, data.upper
+    lower, upper, limits = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST]
     gradient, diagonal, second, coupling = model.gradient, model.diagonal, model.second, model.coupling
     factor = knot.penalty_factor[0]
     e, n = error.shape[0], path.shape[1]

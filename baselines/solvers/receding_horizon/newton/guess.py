@@ -10,6 +10,7 @@ from baselines.solvers.linear_algebra import damped_step, dot
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 # Damped steps that bring the arm from one knot to the next.
 CORRECTIONS = 2
@@ -57,7 +58,7 @@ def initial_guess(problem, first, drift, damping, path, workspace):
                 break
             for j in range(n):
                 moved = here[j] + move[j] + (span * drift[j] if correction == 0 else 0.0)
-                here[j] = min(max(moved, data.lower[j]), data.upper[j])
+                here[j] = min(max(moved, data.limits[LOWER, j]), data.limits[UPPER, j])
 
 
 @uncounted
@@ -67,7 +68,7 @@ def slow_down(problem, path):
     for k in range(path.shape[0]):
         for j in range(path.shape[1]):
             before = path[k - 1, j] if k > 0 else start[j]
-            most = data.velocity_limit[j] * data.dt * length[k]
+            most = data.limits[FASTEST, j] * data.dt * length[k]
             path[k, j] = min(max(path[k, j], before - most), before + most)
 
 

@@ -28,6 +28,7 @@ from baselines.solvers.receding_horizon.newton.minimise import (
 )
 from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE, BEYOND
 from ikgym.kernels.jit import uncounted
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 # μ at the beginning, and w of the limits, in units of the cost for each knot, or of this where that is less. Where the
 # path leaves limits μ is larger by how much it does, up to a bound: else the barrier function has a kink in its way.
@@ -153,7 +154,7 @@ def excess(problem, path, workspace):
     Not above 0 where all limits are kept. Braking behind the last knot is not looked at.
     """
     data, lengths, start = problem.data, problem.grid.length, problem.start
-    limits, lower, upper, changes = data.velocity_limit, data.lower, data.upper, problem.change_limit
+    lower, upper, limits, changes = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST], problem.change_limit
     limited, dt, before = changes.shape[0] > 0, data.dt, workspace.before
     most = clearance_excess(problem.clearance, problem, path, workspace)
     for k in range(path.shape[0]):

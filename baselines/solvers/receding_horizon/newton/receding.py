@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.solvers.near_bodies import bodies_of
-from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.clearance import keep_clear
 from baselines.solvers.receding_horizon.newton.grid import cut, first_knots
@@ -30,7 +29,7 @@ from baselines.solvers.receding_horizon.newton.settings import settings_of
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem
 from baselines.status import Status
 from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
-from ikgym.kernels.kinematics import Chain
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 _CONVERGED, _LIMIT, _SATURATED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -85,15 +84,11 @@ def plan_step_among(model, numbers, seen, memory, answer):
 @expanded
 def plan_rows(model, numbers, seen, memory, answer, clearance):
     """:func:`plan_step` with a :class:`bodies.Clearance`, whose boxes are those of each row or of all, or with None."""
-    chain, kind = model.chain, model.kind
-    # Read-only, as others have compiled for.
-    chain = Chain(chain.offsets, chain.axes, numbers.prismatic, chain.tool, chain.tool_rotation)
-    cost, settings = settings_of(numbers.reals, numbers.integers)
-    data = ProblemData(chain, kind, cost, model.dt, model.lower, model.upper, model.largest)
-    knots, n, plans = settings.at.shape[0], model.unit.shape[0], memory.plans
+    settings = settings_of(numbers.reals, numbers.integers)
+    knots, n, plans = settings.at.shape[0], seen.q.shape[1], memory.plans
     limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n
-    workspace = plan_workspace(kind, seen.nominal.shape[2], knots, n, width, limited, clearance)
-    plan_batch(data, settings, seen, memory, answer, clearance, workspace)
+    workspace = plan_workspace(model.kind, seen.nominal.shape[2], knots, n, width, limited, clearance)
+    plan_batch(model, settings, seen, memory, answer, clearance, workspace)
 
 
 @uncounted
@@ -268,11 +263,11 @@ def _first_velocity(problem, target, qdot):
     length, limited = problem.grid.length[0], changes.shape[0] > 0
     for j in range(q.shape[0]):
         # A limit that holds the plan is kept to the tolerance only; NaN stays NaN.
-        here, limit = target[j], data.velocity_limit[j]
-        if here < data.lower[j]:
-            here = data.lower[j]
-        elif here > data.upper[j]:
-            here = data.upper[j]
+        here, lower, upper, limit = target[j], data.limits[LOWER, j], data.limits[UPPER, j], data.limits[FASTEST, j]
+        if here < lower:
+            here = lower
+        elif here > upper:
+            here = upper
         velocity = (here - q[j]) / (data.dt * length)
         if abs(velocity) > limit:
             kept = kept and abs(velocity) <= (1.0 + KEPT) * limit

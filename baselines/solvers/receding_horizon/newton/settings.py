@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import expanded
 
 Floats = npt.NDArray[np.float64]
@@ -37,13 +36,13 @@ class PlanSettings(NamedTuple):
     change_limit: Floats
 
 
-def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats, Integers]:
-    """The numbers and the whole numbers of cost and settings, each as one read-only block, for :func:`settings_of`.
+def plain_settings(settings: PlanSettings) -> tuple[Floats, Integers]:
+    """The numbers and the whole numbers of settings, each as one read-only block, for :func:`settings_of`.
 
     A `predict` takes arguments apart at 0.1 µs each, which for all of them one by one is longer than a Newton step.
     """
     s = settings
-    numbers = np.array([*cost, s.terminal_weight, s.tolerance, s.rate_weight, *s.change_limit])
+    numbers = np.array([s.terminal_weight, s.tolerance, s.rate_weight, *s.change_limit])
     steps = s.iterations, s.starts, s.restart_steps, s.seed, s.start_steps, s.recovery_steps
     integers = np.array([s.stop_at_end, *steps, *s.at], dtype=np.int64)
     for block in (numbers, integers):
@@ -53,20 +52,18 @@ def plain_settings(cost: CostParameters, settings: PlanSettings) -> tuple[Floats
 
 @expanded
 def settings_of(numbers, integers):
-    """The :class:`CostParameters` and :class:`PlanSettings` that :func:`plain_settings` took apart."""
-    cost = CostParameters(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
-    terminal_weight, tolerance, rate_weight = numbers[5], numbers[6], numbers[7]
-    return cost, PlanSettings(
+    """The :class:`PlanSettings` that :func:`plain_settings` took apart."""
+    return PlanSettings(
         integers[7:],
-        terminal_weight,
+        numbers[0],
         integers[0] != 0,
         integers[1],
-        tolerance,
+        numbers[1],
         integers[2],
         integers[3],
         integers[4],
         integers[5],
         integers[6],
-        rate_weight,
-        numbers[8:],
+        numbers[2],
+        numbers[3:],
     )

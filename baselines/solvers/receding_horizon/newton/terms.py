@@ -23,6 +23,7 @@ from typing import NamedTuple
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.cost import P_X_INSIDE
 from ikgym.kernels.jit import inlined
+from ikgym.kernels.limits import FASTEST, LOWER, UPPER
 
 # ρ of a kink, in units of its steepness over Δ: the larger, the fewer updates of λ and the harder for Newton.
 KINK_PENALTY = 100.0
@@ -150,7 +151,7 @@ def velocity_derivatives(cost, velocity):
 @inlined
 def velocity_limit_term(data, j, velocity, multiplier, penalty_factor):
     """The term of the velocity limit of joint ``j``, in [rad/s] or [m/s]; gives an ``AugmentedTerm``."""
-    limit, cost = data.velocity_limit[j], data.cost
+    limit, cost = data.limits[FASTEST, j], data.cost
     penalty = (
         penalty_factor
         * VELOCITY_PENALTY
@@ -163,7 +164,7 @@ def velocity_limit_term(data, j, velocity, multiplier, penalty_factor):
 def joint_limit_term(data, j, q, multiplier, penalty_factor):
     """The term of the limits of joint ``j``, in [rad] or [m]; gives an ``AugmentedTerm``."""
     penalty = penalty_factor * JOINT_PENALTY * 2.0 / (data.cost.delta_x * data.cost.delta_x)
-    return augmented_term(q, data.lower[j], data.upper[j], multiplier, penalty, math.inf)
+    return augmented_term(q, data.limits[LOWER, j], data.limits[UPPER, j], multiplier, penalty, math.inf)
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.policy_kernels import Model
 from baselines.solvers.receding_horizon.newton.bodies import Clearance, ClearanceWorkspace, clearance_workspace
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.terms import BARRIER_SIZE
@@ -42,7 +42,7 @@ class PathProblem(NamedTuple):
         clearance: Bodies that must not touch, for the interior point method; None where they may.
     """
 
-    data: ProblemData
+    data: Model
     grid: Grid
     start: Floats
     nominal: Floats

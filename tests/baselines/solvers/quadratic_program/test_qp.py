@@ -7,7 +7,6 @@ from scipy.optimize import linprog, lsq_linear
 import baselines
 import ikgym
 from baselines.policy import Batch
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.status import Status
@@ -61,7 +60,7 @@ def program(policy, batch, memory, i, scale=1.0):
     rho = policy.damping * np.sum(jacobian**2 / joints) / model.joints
     rho += policy.lm_damping * (error @ error) / problem.largest_qdot.max() ** 2
     lower, upper = np.empty(model.joints), np.empty(model.joints)
-    velocity_box(limits_with_braking(problem), problem.dt, batch.q[i], batch.qdot[i], lower, upper)
+    velocity_box(problem.limits, problem.dt, batch.q[i], batch.qdot[i], lower, upper)
     hessian, root = jacobian.T @ jacobian + scale * rho * np.diag(joints), np.diag(np.sqrt(rho * joints))
     z = secondary(policy, batch.q[i], hessian, scale * rho, np.linalg.solve(hessian, jacobian.T @ shift))
     matrix, goal = np.vstack([jacobian, root]), np.concatenate([shift, root @ z])

@@ -5,7 +5,6 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.quadratic_program.limits import limits_with_braking
 from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
 
 DT, CHANGE = 0.1, 0.2
@@ -64,7 +63,7 @@ def test_no_choice_of_velocities_within_bounds_meets_a_limit(name):
     rng = np.random.default_rng(1)
     trajectory = ikgym.trajectories.Sinusoid(np.zeros(arm.joints), offset=arm.home)
     scenario = ikgym.Scenario("any", arm, ikgym.tasks.get("pose"), trajectory, dt=0.004, steps=600)
-    env, rows = ikgym.RedundantIKEnv(scenario), limits_with_braking(Problem.of(scenario))
+    env, rows = ikgym.RedundantIKEnv(scenario), Problem.of(scenario).limits
     lower, upper = np.empty(arm.joints), np.empty(arm.joints)
     near = np.where(np.isfinite(arm.lower), arm.lower, -1.0), np.where(np.isfinite(arm.upper), arm.upper, 1.0)
     for share in (0.0, 1e-6, 0.3):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import ProblemData, analytic_gradient
+from baselines.policy import Problem
+from baselines.solvers.receding_horizon.horizon import analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
 
 HORIZONS = pytest.mark.parametrize(
@@ -12,12 +13,9 @@ HORIZONS = pytest.mark.parametrize(
 )
 
 
-def data_of(problem) -> ProblemData:
+def data_of(problem):
     """Of a scenario or a problem."""
-    model, cost = problem.model, problem.cost.parameters
-    return ProblemData(
-        model.chain, problem.task.kind, cost, problem.dt, model.lower, model.upper, problem.velocity_limit
-    )
+    return Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit).kernel_model
 
 
 def horizon_cost(data, q, nominal, qdot):

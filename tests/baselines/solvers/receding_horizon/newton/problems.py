@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import ProblemData
+from baselines.policy_kernels import Model, model_block, model_of
 from baselines.solvers.receding_horizon.newton.cost import linearise, merit
 from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid, first_knots
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
@@ -23,11 +23,17 @@ def grid_of(at, steps=None, terminal=1.0) -> Grid:
     return first_knots(grid, cut(at, int(at[-1]) if steps is None else steps, terminal, grid))
 
 
+def model_tuple(arm, task, cost, dt, bounds) -> Model:
+    """Arm, task and cost with any lower, upper and velocity limits; of the types that a policy's model has."""
+    limits = np.array([*bounds, *np.full((2, arm.joints), np.inf)])
+    return model_of(model_block(Model(arm.chain, task.kind, cost.parameters, dt, bounds[2], limits)))
+
+
 @dataclasses.dataclass
 class Place:
     """A path and everything around it that the kernels are handed."""
 
-    data: ProblemData
+    data: Model
     grid: Grid
     start: np.ndarray
     nominal: np.ndarray
@@ -76,6 +82,5 @@ def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, 
         multipliers[:, e:] = rng.normal(size=(knots, 2 * n)) * (rng.random((knots, 2 * n)) < 0.5)
         multipliers[:, e : e + n] *= 100.0
         multipliers[:, e + n :] *= 100.0 / dt
-    limits = map(read_only, (lower, upper, speed))
-    data = ProblemData(arm.chain, task.kind, TrackingCost(delta_x=delta_x, p_x=p_x).parameters, dt, *limits)
+    data = model_tuple(arm, task, TrackingCost(delta_x=delta_x, p_x=p_x), dt, (lower, upper, speed))
     return Place(data, grid, start, nominal, path, multipliers, e, task.size)

@@ -6,7 +6,6 @@ import numpy as np
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
@@ -68,14 +67,12 @@ def horizon_of(problem: Problem, state: State, knots=KNOTS, at=None) -> Horizon:
 def path_problem(problem: Problem, horizon: Horizon, braking=True) -> PathProblem:
     """A horizon as the kernels see it."""
     arm, at = problem.model, np.cumsum(horizon.lengths).astype(int)
-    # Read-only where a policy's are: kernels are compiled once for both.
-    fastest, change = read_only(problem.largest_qdot), read_only(DT * arm.acceleration_limit)
-    data = ProblemData(arm.chain, problem.task.kind, problem.cost.parameters, DT, arm.lower, arm.upper, fastest)
+    # Read-only where a policy's is: kernels are compiled once for both.
+    change = read_only(DT * arm.acceleration_limit)
     nominal = np.zeros((at[-1], problem.task.size))
     nominal[at - 1] = horizon.nominal
-    return PathProblem(
-        data, grid_of(at), np.array(horizon.q), nominal, np.array(horizon.qdot_before), 0.0, change, braking
-    )
+    q, before = np.array(horizon.q), np.array(horizon.qdot_before)
+    return PathProblem(problem.kernel_model, grid_of(at), q, nominal, before, 0.0, change, braking)
 
 
 def solved(problem: Problem, horizon: Horizon, path=None, braking=True, exact=True, steps=300, tolerance=1e-8):

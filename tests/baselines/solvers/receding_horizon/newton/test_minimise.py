@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import ProblemData
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings, minimise
 from baselines.solvers.receding_horizon.newton.newton_step import newton_step, pentadiagonal_step
@@ -14,8 +13,7 @@ from baselines.solvers.receding_horizon.newton.workspace import PathProblem, new
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.kernels import tasks as task_kernels
-from ikgym.validation import read_only
-from tests.baselines.solvers.receding_horizon.newton.problems import UNLIMITED, grid_of
+from tests.baselines.solvers.receding_horizon.newton.problems import UNLIMITED, grid_of, model_tuple
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
 
@@ -72,8 +70,7 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     arm = Arm("slider", np.zeros((1, 3)), [[1.0, 0.0, 0.0]], (True,))
     task = ikgym.tasks.get("position")
     cost = TrackingCost(delta_x=S, p_x=3.0, delta_qdot=1.0, p_out=2.0, p_in=2.0)
-    limits = (read_only(np.array([limit])) for limit in (-np.inf, upper * S, speed))
-    data = ProblemData(arm.chain, task.kind, cost.parameters, S, *limits)
+    data = model_tuple(arm, task, cost, S, np.array([[-np.inf], [upper * S], [speed]]))
     goals = np.atleast_1d(goals)
     grid = grid_of(range(1, len(goals) + 1), terminal=weight)
     nominal = np.zeros((len(goals), 3))
