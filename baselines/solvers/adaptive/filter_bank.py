@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -15,7 +16,6 @@ from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.kalman import absorb, linearise, prior_covariance, write_deviation
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import FloatArray, flag, float_array, number
 
@@ -23,6 +23,11 @@ from ikgym.validation import FloatArray, flag, float_array, number
 LEAST = -20.0
 #: Changes of joint zeros between two measurements: none, of all joints alike, of each joint by itself.
 NONE, ALIKE, EACH = range(3)
+#: The squared innovation of a measurement, in standard deviations, has the mean e. The part above TOLERATED e adds up,
+#: and beyond ALARM the arm has changed: by noise alone about once in a million measurements.
+TOLERATED, ALARM = 2.0, 30.0
+#: Measurements after such a change before the next one: where all are surprises, the noise is larger than stated.
+PAUSE = 20
 
 
 class BankMemory(NamedTuple):
@@ -32,42 +37,47 @@ class BankMemory(NamedTuple):
         before: See :class:`Measurement`. Shape (B, h, n).
         age: See :class:`Measurement`. Shape (B, 1).
         rest: Part of the change of the estimate that is not blended in yet. Shape (B, 6).
+        since: Steps since the last measurement. Shape (B,).
         estimates: Parameters of the arm, see :mod:`baselines.solvers.adaptive.chain_parameters`. Shape (B, K, p).
         covariances: Of their errors. Shape (B, K, p, p).
         weights: Logarithms of the filters' probabilities. Shape (B, K).
-        since: Steps since the last measurement. Shape (B,).
+        surprise: Sums of the excess of innovations over their expectation. Shape (B, K).
+        quiet: How many measurements ago joint zeros were last taken to have changed suddenly. Shape (B,).
     """
 
     before: FloatArray
     age: FloatArray
     rest: FloatArray
+    since: npt.NDArray[np.int64]
     estimates: FloatArray
     covariances: FloatArray
     weights: FloatArray
-    since: npt.NDArray[np.int64]
+    surprise: FloatArray
+    quiet: npt.NDArray[np.int64]
 
 
-def _noises(name: str, value: Sequence[float]) -> tuple[float, ...]:
-    """One or more standard deviations above 0.
+class ChangeModel(NamedTuple):
+    """How joint zeros may change.
 
-    Raises:
-        InvalidInputError: There is none, or one is out of its range.
+    Attributes:
+        rate: The probability of a change in a step, of all alike or of each, equally likely.
+        alike: Variance of a change of all joint zeros alike, in [rad²] or [m²].
+        each: The same of a change of each by itself.
+        walk: Variance of the change in each step.
+        jump: Variance of a change where poses are farther from what was expected than noise brings them (the cumulative
+            sum of Page 1954); 0 for none.
     """
-    given = float_array(name, value, (None,))
-    if not given.size:
-        raise InvalidInputError(f"{name}: expected one or more standard deviations, got none.")
-    return tuple(number(name, float(one), above=0.0) for one in given)
+
+    rate: float = 0.0
+    alike: float = 0.0
+    each: float = 0.0
+    walk: float = 0.0
+    jump: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class FilterBank(Corrected):
-    """Estimates an arm by Kalman filters, each with another noise, and mixes them by their probabilities.
-
-    Multiple-model estimation (Magill 1965; Bar-Shalom, Li and Kirubarajan 2001, ch. 11): the filters of
-    :class:`Calibrated` run side by side, and the likelihood of each pose that is measured weighs them by Bayes' rule.
-    Within a filter, joint zeros may have changed since the last measurement: not at all, all alike, as by a payload,
-    or each by itself. These three are weighed likewise, and merged to one mean and covariance at each measurement, as
-    by an interacting multiple-model filter whose modes are drawn anew each time.
+class ArmFilters(Corrected, abc.ABC):
+    """Base of policies that estimate joint zeros, links and axes by Kalman filters, and correct a base policy.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -75,40 +85,36 @@ class FilterBank(Corrected):
         options: Its parameters; those left out have its defaults.
         history: See :class:`Corrected`.
         blend: See :class:`Corrected`.
-        zero: See :class:`Calibrated`.
-        link: See :class:`Calibrated`.
-        axis: See :class:`Calibrated`.
-        noises: Standard deviation of each part of a measured pose, one a filter, in [m] and [rad]. Above 0.
-        alike: Standard deviation of a sudden change of all joint zeros alike, in [rad] or [m].
-        each: The same of a change of each by itself.
-        rate: How often joint zeros change in either way, in [1/s].
-        start: See :class:`Calibrated`.
-        keep: See :class:`Calibrated`.
-
-    Raises:
-        UnknownNameError: There is no such policy, or parameter of it.
-        InvalidInputError: The base policy is a reference, or it refuses its parameters; a number is out of its range.
+        zero: Standard deviation of the joint zeros before anything is measured, in [rad] or [m]. Of at least 0.
+        link: The same of each part of the offsets from joint to joint, and of the tool point, in [m].
+        axis: The same of each of the two tilts of an axis, in [rad].
+        start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad]: where it
+            has been jogged there, that is the best measurement of all. None where it may begin anywhere.
+        keep: Whether the estimate of the arm survives the start of an episode, and is cleared with the state alone.
     """
 
     zero: float = parameter(5e-4, number, at_least=0.0)
     link: float = parameter(3e-4, number, at_least=0.0)
     axis: float = parameter(5e-4, number, at_least=0.0)
-    noises: tuple[float, ...] = parameter((1e-5, 1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3), _noises)
-    alike: float = parameter(1e-3, number, at_least=0.0)
-    each: float = parameter(1e-2, number, at_least=0.0)
-    rate: float = parameter(0.2, number, at_least=0.0)
     start: float | None = parameter(None, number, above=0.0)
     keep: bool = parameter(False, flag)
 
-    name: ClassVar[str] = "filter_bank"
+    @abc.abstractmethod
+    def variances(self) -> FloatArray:
+        """Of the noise of each component of the error, filter by filter. Shape (K, e)."""
+
+    @abc.abstractmethod
+    def changes(self) -> ChangeModel:
+        """How joint zeros may change."""
 
     def own_memory(self, rows: int) -> BankMemory:
         """See :meth:`Wrapper.own_memory`."""
         prior = prior_covariance(self.problem.model.joints, self.zero, self.link, self.axis)
-        covariances = np.tile(prior, (rows, len(self.noises), 1, 1))
-        weights = np.full(covariances.shape[:2], -math.log(len(self.noises)))
+        covariances = np.tile(prior, (rows, len(self.variances()), 1, 1))
+        weights = np.full(covariances.shape[:2], -math.log(covariances.shape[1]))
+        estimates, surprise, quiet = np.zeros(covariances.shape[:3]), np.zeros(weights.shape), np.full(rows, PAUSE)
         since = np.zeros(rows, np.int64)
-        return BankMemory(*self.sensors(rows), np.zeros(covariances.shape[:3]), covariances, weights, since)
+        return BankMemory(*self.sensors(rows), since, estimates, covariances, weights, surprise, quiet)
 
     def own_restarted(self, own: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
@@ -120,26 +126,79 @@ class FilterBank(Corrected):
         self, batch: Batch, measured: Measurement, own: BankMemory, out: FloatArray, old: FloatArray
     ) -> BankMemory:
         """See :meth:`Corrected.learn`."""
-        kept = own._replace(since=own.since + 1)
-        if measured.new.any() or measured.first.any():
-            kept = kept._replace(**{name: getattr(own, name).copy() for name in own._fields[3:6]})
-        known, noises = (self.problem.model.chain, self.problem.task.kind), np.array(self.noises)
+        changes, kept = self.changes(), own._replace(since=own.since + 1)
+        if measured.new.any() or measured.first.any() or changes.walk > 0.0:
+            kept = kept._replace(**{name: getattr(own, name).copy() for name in own._fields[4:]})
+        known, variances = (self.problem.model.chain, self.problem.task.kind), self.variances()
         if self.start is not None and measured.first.any():
-            exact, first = np.full_like(noises, self.start**2), np.ascontiguousarray(batch.nominal[:, 0])
-            bank_rows((*known, exact, (0.0, 0.0, 0.0)), batch.q, first, batch.q, measured.first, kept, out, old)
-        changes = self.rate * self.problem.dt, self.alike**2, self.each**2
-        bank_rows((*known, noises**2, changes), batch.q, batch.pose, measured.q, measured.new, kept, out, old)
+            exact, first = np.full_like(variances, self.start**2), np.ascontiguousarray(batch.nominal[:, 0])
+            bank_rows((*known, exact, ChangeModel()), batch.q, first, batch.q, measured.first, kept, out, old)
+        bank_rows((*known, variances, changes), batch.q, batch.pose, measured.q, measured.new, kept, out, old)
         kept.since[measured.new] = 0
         return kept
 
 
-@kernel
-def bank_rows(rule, q, pose, then, new, known, deviation, old):
-    """Takes the measurements in, and tells the deviations, row by row.
+def _noises(name: str, value: Sequence[float]) -> tuple[float, ...]:
+    """One or more standard deviations above 0.
+
+    Raises:
+        InvalidInputError: There is none, or one is out of its range.
+    """
+    deviations = float_array(name, value, (None,))
+    if not deviations.size:
+        raise InvalidInputError(f"{name}: expected one or more standard deviations, got none.")
+    return tuple(number(name, float(deviation), above=0.0) for deviation in deviations)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FilterBank(ArmFilters):
+    """Estimates an arm by Kalman filters, each with another noise, and mixes them by their probabilities.
+
+    Multiple-model estimation (Magill 1965; Bar-Shalom, Li and Kirubarajan 2001, ch. 11): filters like that of
+    :class:`Calibrated` run in parallel, and the likelihood of each pose that is measured weighs them by Bayes' rule.
+    Within a filter, joint zeros may have changed since the last measurement: not at all, all alike, as by a payload,
+    or each by itself. These three are weighed likewise, and merged to one mean and covariance at each measurement, as
+    by an interacting multiple-model filter whose modes are drawn anew each time.
 
     Args:
-        rule: The model of the arm, the kind of task coordinates, the variances of the noise, of shape (K,); and the
-            probability of a change in a step, and the variances of a change of all joint zeros alike and of each.
+        problem: The scenario as the policy knows it.
+        policy: The name of the base policy.
+        options: Its parameters; those left out have its defaults.
+        history, blend: See :class:`Corrected`.
+        zero, link, axis, start, keep: See :class:`ArmFilters`.
+        noises: Standard deviation of each part of a measured pose, one a filter, in [m] and [rad]. Above 0.
+        alike: Standard deviation of a sudden change of all joint zeros alike, in [rad] or [m].
+        each: The same of a change of each by itself.
+        rate: How often joint zeros change in either way, in [1/s].
+
+    Raises:
+        UnknownNameError: There is no such policy, or parameter of it.
+        InvalidInputError: The base policy is a reference, or it refuses its parameters; a number is out of its range.
+    """
+
+    noises: tuple[float, ...] = parameter((1e-5, 1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3), _noises)
+    alike: float = parameter(1e-3, number, at_least=0.0)
+    each: float = parameter(1e-2, number, at_least=0.0)
+    rate: float = parameter(0.2, number, at_least=0.0)
+
+    name: ClassVar[str] = "filter_bank"
+
+    def variances(self) -> FloatArray:
+        """See :meth:`ArmFilters.variances`."""
+        return np.repeat(np.array(self.noises)[:, None] ** 2, self.problem.task.error_size, axis=1)
+
+    def changes(self) -> ChangeModel:
+        """See :meth:`ArmFilters.changes`."""
+        return ChangeModel(self.rate * self.problem.dt, self.alike**2, self.each**2)
+
+
+@kernel
+def bank_rows(rule, q, pose, then, new, known, deviation, old):
+    """Kalman update, row by row; writes the estimated deviations.
+
+    Args:
+        rule: The model of the arm, the kind of task coordinates, the variances of the noises, of shape (K, e), and a
+            :class:`ChangeModel`.
         q: Present joint coordinates in [rad] or [m]. Shape (B, n).
         pose: Measured task coordinates. Shape (B, m).
         then: Joint coordinates where they were measured. Shape (B, n).
@@ -148,58 +207,78 @@ def bank_rows(rule, q, pose, then, new, known, deviation, old):
         deviation: Receives the deviations. Shape (B, 6).
         old: Receives the ones without the measurements. Shape (B, 6).
     """
-    chain, kind, variances, (rate, alike, each) = rule
+    chain, kind, variances, changes = rule
     n, p = q.shape[1], known.estimates.shape[2]
     parts = np.empty((n, 3)), np.empty((n, 3)), np.empty(3)
-    e = task_kernels.error_size(kind, pose.shape[1])
-    error, sensitivity = np.empty(e), np.empty((e, p))
+    error, sensitivity = np.empty(variances.shape[1]), np.empty((variances.shape[1], p))
     for row in range(q.shape[0]):
-        estimates, weights = known.estimates[row], known.weights[row]
+        estimates, weights, surprise = known.estimates[row], known.weights[row], known.surprise[row]
+        if changes.walk > 0.0:
+            for k in range(variances.shape[0]):
+                add_to_zeros(changes.walk, n, known.covariances[row, k])
         mean = mixed(weights, estimates)
         arm = write_deviation(chain, kind, mean, q[row], parts, old[row])
         deviation[row] = old[row]
         if new[row]:
             linearise(arm, kind, then[row] + mean[:n], pose[row], error, sensitivity)
-            changes = min(rate * known.since[row], 0.5), alike, each
+            known.quiet[row] += 1
+            rate = min(changes.rate * known.since[row], 0.5)
+            jump = changes.jump if known.quiet[row] > PAUSE else 0.0
+            now = ChangeModel(rate, changes.alike, changes.each, 0.0, jump)
             for k in range(variances.shape[0]):
                 if weights[k] > -np.inf:
-                    measured = sensitivity, error, np.full(e, variances[k])
+                    measured = sensitivity, error, variances[k]
                     estimates[k] -= mean
-                    weights[k] += update(measured, changes, n, estimates[k], known.covariances[row, k])
+                    weights[k] += update(measured, now, n, estimates[k], known.covariances[row, k], surprise[k : k + 1])
                     estimates[k] += mean
+                    if surprise[k] < 0.0:
+                        known.quiet[row], surprise[k] = 0, 0.0
             normalise(weights)
             write_deviation(chain, kind, mixed(weights, estimates), q[row], parts, deviation[row])
 
 
 @inner
-def update(measured, changes, n, change, covariance):
+def update(measured, changes, n, change, covariance, surprise):
     """One step of a filter, over the three ways in which joint zeros may have changed.
 
     Args:
         measured: Derivatives of the pose by the parameters, its error, and the variances of its noise.
-        changes: The probability of a change, and the variances of one of all joint zeros alike and of each.
+        changes: A :class:`ChangeModel`, with the probability of a change since the last measurement.
         n: Joints.
         change: Of the parameters, from where the error was linearised, changed in place. Shape (p,).
         covariance: Changed in place. Shape (p, p).
+        surprise: Excess of the innovations before, to which that of this one is added; -1 where a jump of the joint
+            zeros explains it. Shape (1,).
 
     Returns:
-        The logarithm of the likelihood, but for a constant.
+        The logarithm of the likelihood without a constant term.
     """
-    rate, alike, each = changes
     means, covariances = np.zeros((3, change.shape[0])), np.zeros((3, *covariance.shape))
     weights = np.full(3, -np.inf)
-    for mode in range(3 if rate > 0.0 else 1):
+    for mode in range(3 if changes.rate > 0.0 else 1):
         means[mode], covariances[mode] = change, covariance
         if mode == ALIKE:
-            covariances[mode, :n, :n] += alike
+            covariances[mode, :n, :n] += changes.alike
         elif mode == EACH:
-            for i in range(n):
-                covariances[mode, i, i] += each
-        surprise, size = absorb(*measured, means[mode], covariances[mode])
-        weights[mode] = math.log(1.0 - rate if mode == NONE else 0.5 * rate) - 0.5 * (surprise + size)
+            add_to_zeros(changes.each, n, covariances[mode])
+        square, size = absorb(*measured, means[mode], covariances[mode])
+        if mode == NONE:
+            surprise[0] = max(surprise[0] + square - TOLERATED * measured[1].shape[0], 0.0)
+            if changes.jump > 0.0 and surprise[0] > ALARM:
+                surprise[0], means[mode], covariances[mode] = -1.0, change, covariance
+                add_to_zeros(changes.jump, n, covariances[mode])
+                square, size = absorb(*measured, means[mode], covariances[mode])
+        weights[mode] = math.log(1.0 - changes.rate if mode == NONE else 0.5 * changes.rate) - 0.5 * (square + size)
     likelihood = normalise(weights)
     merge(weights, means, covariances, change, covariance)
     return likelihood
+
+
+@inner
+def add_to_zeros(variance, n, covariance):
+    """Adds a variance to that of each of n joint zeros. Shape (p, p)."""
+    for i in range(n):
+        covariance[i, i] += variance
 
 
 @inner
@@ -224,10 +303,10 @@ def merge(weights, means, covariances, mean, covariance):
 
 @inner
 def normalise(weights):
-    """Makes probabilities of likelihoods, both as logarithms, in place.
+    """Normalises log-likelihoods to log-probabilities, in place.
 
     Args:
-        weights: Shape (K,). Those that become too small become minus infinity.
+        weights: Shape (K,). Those below LEAST become minus infinity.
 
     Returns:
         The logarithm of the sum of the likelihoods.
