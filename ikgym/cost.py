@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable
 from typing import Annotated
 
@@ -15,11 +14,11 @@ from ikgym.frozen import Frozen
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
 from ikgym.kernels.cost import CostParameters
-from ikgym.validation import FloatArray, Positive, float_array, number
+from ikgym.validation import Bounds, FloatArray, Positive, float_array
 
 #: The exponents of the cost do not exceed it.
 LARGEST_EXPONENT = 100.0
-Exponent = Annotated[float, functools.partial(number, at_least=1.0, at_most=LARGEST_EXPONENT)]
+Exponent = Annotated[float, Bounds(at_least=1.0, at_most=LARGEST_EXPONENT)]
 
 
 @dataclasses.dataclass(frozen=True)

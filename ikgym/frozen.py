@@ -7,22 +7,28 @@ import dataclasses
 import functools
 import types
 import typing
-from collections.abc import Callable, Mapping
-from typing import Any, Self
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import known_names, shortened
+from ikgym.validation import Bounds, choice, known_names, shortened
+
+#: Called with the name and the value of a field; returns the value, checked.
+Check = Callable[[str, Any], Any]
+#: What counts as one in an annotation.
+CHECKS = (Bounds, functools.partial, types.FunctionType)
 
 
 class Frozen:
     """Base of the frozen dataclasses: changed copies by name, and arrays that stay read-only when pickled.
 
-    Annotations may name a check, as :data:`ikgym.validation.Positive` does; its result becomes the value of the field.
-    Texts and fields that are frozen dataclasses themselves are checked for their class.
+    A field is checked by its annotation: ``Annotated[float, Bounds(above=0.0)]`` is a number above 0, ``Annotated[X,
+    check]`` the result of ``check(name, value)``, ``Literal["a", "b"]`` one of these words. Texts and fields that are
+    frozen dataclasses themselves are checked for their class.
     """
 
     def __post_init__(self) -> None:
-        for name, (check, optional) in _checks(type(self)).items():  # type: ignore[arg-type]  # a class has a hash
+        for name, (check, optional) in checks_of(type(self)).items():  # type: ignore[arg-type]  # a class has a hash
             value = getattr(self, name)
             if value is not None or not optional:
                 self._settle(**{name: check(name, value)})
@@ -50,23 +56,7 @@ class Frozen:
 
 
 @functools.cache
-def _checks(kind: Any) -> Mapping[str, tuple[Callable[[str, Any], Any], bool]]:
-    """The checks of the fields of a class, named by their annotations or of a class, and whether they may be None."""
-    hints = hints_of(kind)
-    found: dict[str, tuple[Callable[[str, Any], Any], bool]] = {}
-    for name in (field.name for field in dataclasses.fields(kind) if field.init and field.name in hints):
-        hint = hints[name]
-        parts = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
-        given = [part for part in parts if part is not type(None)] or [hint]
-        classes = tuple(part for part in given if isinstance(part, type) and issubclass(part, (Frozen, str)))
-        if len(classes) == len(given):
-            found[name] = functools.partial(_instance, kinds=classes), len(given) < len(parts)
-        for check in filter(callable, getattr(given[0], "__metadata__", ())):
-            found[name] = check, len(given) < len(parts)
-    return found
-
-
-def hints_of(kind: type[Any]) -> dict[str, Any]:
+def hints_of(kind: Any) -> dict[str, Any]:
     """The annotations of a class and its bases, with all that :data:`typing.Annotated` adds."""
     hints: dict[str, Any] = {}
     for base in reversed(kind.__mro__):
@@ -76,7 +66,63 @@ def hints_of(kind: type[Any]) -> dict[str, Any]:
     return hints
 
 
-def _instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
+@functools.cache
+def checks_of(kind: Any) -> Mapping[str, tuple[Check, bool]]:
+    """The checks of the fields of a class by name, and whether a field may be None.
+
+    A subclass that annotates a field anew, such as for another default, keeps the check of its base.
+    """
+    found: dict[str, tuple[Check, bool]] = {}
+    for base in reversed(kind.__mro__):
+        hints = hints_of(base)
+        for name in filter(hints.__contains__, vars(base).get("__annotations__", ())):
+            check, optional = _check(hints[name])
+            if check or name in found:
+                found[name] = check or found[name][0], optional
+    return {f.name: found[f.name] for f in dataclasses.fields(kind) if f.init and f.name in found}
+
+
+def _check(hint: Any) -> tuple[Check | None, bool]:
+    """The check that an annotation names, and whether it allows None."""
+    parts = list(parts_of(hint))
+    given = [(kind, notes) for kind, notes in parts if kind is not type(None)]
+    words = [word for kind, _ in given if typing.get_origin(kind) is Literal for word in typing.get_args(kind)]
+    others = [(kind, notes) for kind, notes in given if typing.get_origin(kind) is not Literal]
+    notes = [(kind, note) for kind, notes in others for note in notes if isinstance(note, CHECKS)]
+    check: Check | None = None
+    if notes:
+        kind, note = notes[0]
+        check = note.check(kind) if isinstance(note, Bounds) else note
+    elif others and all(isinstance(kind, type) and issubclass(kind, (Frozen, str)) for kind, _ in others):
+        check = functools.partial(check_instance, kinds=tuple(kind for kind, _ in others))
+    if words:
+        check = functools.partial(_one_of, words=words, otherwise=check)
+    return check, len(given) < len(parts)
+
+
+def parts_of(hint: Any, notes: tuple[Any, ...] = ()) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    """The classes of an annotation, and what :data:`typing.Annotated` adds to each."""
+    if typing.get_origin(hint) is Annotated:
+        yield from parts_of(hint.__origin__, hint.__metadata__ + notes)
+    elif typing.get_origin(hint) in {typing.Union, types.UnionType}:
+        for part in typing.get_args(hint):
+            yield from parts_of(part, notes)
+    else:
+        yield hint, notes
+
+
+def _one_of(name: str, value: Any, words: Sequence[str], otherwise: Check | None) -> Any:
+    if otherwise is not None and not isinstance(value, str):
+        return otherwise(name, value)
+    return choice(name, value, words)
+
+
+def check_instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
+    """An object of one of these classes.
+
+    Raises:
+        InvalidInputError: It is none of them.
+    """
     if not isinstance(value, kinds):
         wanted = " or ".join("a text" if kind is str else f"an object of {kind.__name__}" for kind in kinds)
         raise InvalidInputError(f"{name}: expected {wanted}, got {shortened(value)}.")

@@ -216,9 +216,43 @@ def interval(name: str, value: npt.ArrayLike, least: float = -LARGEST, most: flo
     return low, high
 
 
+@dataclasses.dataclass(frozen=True)
+class Bounds:
+    """Bounds of a number as the annotation of a field, see :class:`ikgym.frozen.Frozen`; of a whole number for int."""
+
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    below: float | None = None
+
+    def check(self, kind: type[Any]) -> functools.partial[Any]:
+        """The check of a field of this class, int or float."""
+        bounds = {name: bound for name, bound in vars(self).items() if bound is not None}
+        return functools.partial(whole_number if kind is int else number, **bounds)
+
+    def __str__(self) -> str:
+        return _range(self.above, self.at_least, self.at_most, self.below).strip()
+
+
+def one_of(names: Iterable[str]) -> functools.partial[str]:
+    """The check of a field that is one of these names; for few ones there is :data:`typing.Literal`."""
+    return functools.partial(choice, available=names)
+
+
+def choice(name: str, value: Any, available: Iterable[str]) -> str:
+    """One of several names.
+
+    Raises:
+        UnknownNameError: It is none of them.
+    """
+    known_name(f"choice of {name}", value, available)
+    return str(value)
+
+
 #: Fields of frozen dataclasses that name their check: a number of either sign, and one from 1e-12 to 1e12.
-Signed = Annotated[float, functools.partial(number, at_least=-LARGEST, at_most=LARGEST)]
-Positive = Annotated[float, functools.partial(number, at_least=SMALLEST, at_most=LARGEST)]
+Signed = Annotated[float, Bounds(at_least=-LARGEST, at_most=LARGEST)]
+Positive = Annotated[float, Bounds(at_least=SMALLEST, at_most=LARGEST)]
+Flag = Annotated[bool, flag]
 #: Arrays up to 1e12: of shape (n,); of shape (3,); likewise, but not 0; likewise, all of at least 1e-12.
 Numbers = Annotated[FloatArray, functools.partial(frozen_array, shape=(None,), at_most=LARGEST)]
 Vector = Annotated[FloatArray, functools.partial(frozen_array, shape=(3,), at_most=LARGEST)]

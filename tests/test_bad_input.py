@@ -15,6 +15,7 @@ import ikgym.rl
 import ikgym.sb3
 from ikgym.arms.bodies import MOST_BODIES, Bodies
 from ikgym.exceptions import IkgymError
+from ikgym.frozen import Frozen
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import Box, Capsule, HalfSpace, RandomBoxes, Sphere
 from ikgym.plant import Plant
@@ -44,6 +45,7 @@ from ikgym.trajectories import (
 from ikgym.trajectories.orientations import ORIENTATIONS
 from ikgym.trajectories.paths import PATHS
 from ikgym.trajectories.time_laws import TIME_LAWS
+from ikgym.validation import Bounds, Flag
 from tests.comparison import fields, identical
 
 FRAME = [*np.eye(3).ravel(), 1.0, 0.0, 0.0]
@@ -183,6 +185,36 @@ def test_a_class_of_ones_own_may_have_annotations_that_nobody_knows():
         assert kind("a", [0, 0, 0], 1).radius == 1.0
         with pytest.raises(IkgymError, match="radius"):
             kind("a", [0, 0, 0], -1.0)
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"count": 0}, "count: expected a whole number of at least 1, got 0"),
+        ({"count": None}, "count: expected a whole number"),
+        ({"share": 1.5}, r"share: expected a finite number from 0 to 1, got 1\.5"),
+        ({"way": "lft"}, "choice of way 'lft'. Did you mean 'left'"),
+        ({"timed": "al"}, "choice of timed 'al'. Did you mean 'all'"),
+        ({"timed": 0}, "timed: expected a whole number of at least 1, got 0"),
+        ({"twice": 1}, "twice: expected true or false, got 1"),
+    ],
+)
+def test_annotations_are_checks_and_hold_in_subclasses(bad, message):
+    @dataclasses.dataclass(frozen=True)
+    class Base(Frozen):
+        count: typing.Annotated[int, Bounds(at_least=1)] = 1
+        share: typing.Annotated[float, Bounds(at_least=0.0, at_most=1.0)] | None = None
+        way: typing.Literal["left", "right"] = "left"
+        timed: typing.Annotated[int | typing.Literal["all"], "for a reader", Bounds(at_least=1)] = "all"
+        twice: Flag = False
+
+    @dataclasses.dataclass(frozen=True)
+    class Derived(Base):
+        count: int = 3
+
+    assert Derived(share=1, timed=2) == Derived(3, 1.0, "left", 2, False)
+    with pytest.raises(IkgymError, match=message):
+        Derived(**bad)
 
 
 def test_every_kind_of_part_is_in_the_table():

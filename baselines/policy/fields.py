@@ -19,7 +19,7 @@ def derived() -> Any:
 
 
 @functools.cache
-def kernel_fields(policy: type[Any]) -> tuple[str, ...]:
+def kernel_fields(policy: Any) -> tuple[str, ...]:
     """Names of the fields that a kernel takes: parameters of the type float, int or bool, and derived fields."""
     hints = hints_of(policy)
     numbers = {name for name, hint in hints.items() if getattr(hint, "__origin__", hint) in {float, int, bool}}

@@ -28,7 +28,6 @@ from baselines.policy.arguments import (
     taken,
     truth_values,
 )
-from baselines.policy.parameters import checked
 from baselines.policy.problem import Batch, Memory, Problem, Solution
 from baselines.policy.sharing import divided, undivided
 from baselines.policy_kernels import all_finite, cut_rows, sent_rows
@@ -47,8 +46,8 @@ compiled_classes: set[Any] = set()
 class SolverPolicy(Frozen, abc.ABC):
     """Base of all solvers: turns `solve` on a batch into Stable-Baselines3's `predict`.
 
-    A policy is a frozen dataclass: its fields behind ``problem`` are its parameters, and whatever changes from
-    step to step travels through ``state``. It never touches an environment.
+    A policy is a frozen dataclass: its fields behind ``problem`` are its parameters, checked by their annotations, see
+    :class:`Frozen`, and whatever changes from step to step travels through ``state``. It never touches an environment.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -74,10 +73,6 @@ class SolverPolicy(Frozen, abc.ABC):
     positional: ClassVar[str | None] = None
     #: Parameters without which nobody can tell whether the policy suits a scenario.
     decisive: ClassVar[tuple[str, ...]] = ()
-
-    def __post_init__(self) -> None:
-        """Checks the parameters that :func:`baselines.policy.parameters.parameter` declares with a range."""
-        self._settle(**checked(self))
 
     def __init_subclass__(cls, **options: Any) -> None:
         """A policy that gives itself no name, nor has one of its base, is called by its class."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import typing
 from collections.abc import Iterator, Sequence
 from typing import Annotated
@@ -17,13 +16,13 @@ from ikgym.kernels.bodies import OBSTACLE
 from ikgym.kernels.random_numbers import stream
 from ikgym.obstacles.obstacle import Box, Obstacle
 from ikgym.trajectories import Trajectory, joint_paths_of
-from ikgym.validation import FloatArray, Positive, Sizes, Vector, number, whole_number
+from ikgym.validation import Bounds, FloatArray, Positive, Sizes, Vector, number
 
 #: Where boxes are before they are drawn: so far below the base, in [m].
 AWAY = 1e6
 #: Most boxes of one obstacle.
 MOST_BOXES = 1000
-Count = Annotated[int, functools.partial(whole_number, at_least=1, at_most=MOST_BOXES)]
+Count = Annotated[int, Bounds(at_least=1, at_most=MOST_BOXES)]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -18,15 +18,14 @@ from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import (
     LARGEST,
     SMALLEST,
+    Bounds,
     FloatArray,
     Numbers,
     Positive,
     float_array,
     frozen_array,
     interval,
-    number,
     per_joint,
-    whole_number,
 )
 
 # Most spans: each draw needs memory for all of them.
@@ -110,8 +109,8 @@ class RandomJointSpline(Trajectory):
     velocity_limit: FloatArray
     acceleration_limit: FloatArray
     duration: Positive
-    spans: Annotated[int, functools.partial(whole_number, at_least=3, at_most=MOST_SPANS)] = 8
-    margin: Annotated[float, functools.partial(number, at_least=0.0, at_most=0.99)] = 0.1
+    spans: Annotated[int, Bounds(at_least=3, at_most=MOST_SPANS)] = 8
+    margin: Annotated[float, Bounds(at_least=0.0, at_most=0.99)] = 0.1
     scale: Annotated[tuple[float, float], functools.partial(interval, least=0.0, most=1.0)] = (0.2, 1.0)
     random: typing.ClassVar[bool] = True
 

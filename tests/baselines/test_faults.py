@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.policy.parameters import checks
 from baselines.registry import get
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.frozen import check_instance, checks_of
 from ikgym.plant.checks import joint_numbers
 from ikgym.validation import number, whole_number
 from tests.baselines.making import made, usual
@@ -37,13 +37,16 @@ def test_parameters_of_any_type_are_taken_or_refused_in_one_line(name):
 
 def bad_values(check):
     """Values that the check of a parameter refuses, by what it says itself."""
-    if check.func in (number, whole_number):
+    func = getattr(check, "func", check)
+    if func in (number, whole_number):
         yield from ("x", np.nan, None, True)
         yield from (check.keywords[bound] for bound in ("above", "below") if bound in check.keywords)
         yield from (check.keywords["at_least"] - 1,) if "at_least" in check.keywords else ()
         yield from (check.keywords["at_most"] + 1,) if "at_most" in check.keywords else ()
-        yield from (1.5,) if check.func is whole_number else (np.inf,)
-    elif check.func is joint_numbers:
+        yield from (1.5,) if func is whole_number else (np.inf,)
+    elif func is check_instance:
+        yield from (1, [])
+    elif func is joint_numbers:
         yield from ("x", np.nan, True, -1.0, [[1.0]])
     else:  # one of several words, or a truth value
         yield from ("nothing like it", 1, None)
@@ -51,9 +54,11 @@ def bad_values(check):
 
 @pytest.mark.parametrize("name", baselines.names())
 def test_parameters_out_of_their_range_are_refused_by_name(name):
-    for parameter, check in checks(get(name)).items():
+    checks = checks_of(get(name))
+    for parameter in checks.keys() & get(name).parameter_names():
+        check, optional = checks[parameter]
         for value in bad_values(check):
-            if value is None and "None" in get(name).__dataclass_fields__[parameter].type:
+            if value is None and optional:
                 continue
             with pytest.raises(
                 (InvalidInputError, UnknownNameError), match=f"{parameter}.*(expected|Available|Did you mean)"

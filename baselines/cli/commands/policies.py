@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+import typing
 
 from baselines import registry
 from baselines.cli import shell
+from ikgym.frozen import hints_of, parts_of
+from ikgym.validation import Bounds
 
 
 def _policy_row(name: str) -> tuple[str, ...]:
@@ -21,13 +24,25 @@ def summary(name: str) -> str:
 
 def _policy(name: str, _: shell.Names) -> str:
     policy = registry.get(name)
-    fields = policy.__dataclass_fields__
-    given = [(p, fields[p].default, fields[p].default_factory) for p in policy.parameter_names()]
-    parameters = [
-        f"  {p} = {default!r}" if made is dataclasses.MISSING else f"  {p} = {made()!r}" for p, default, made in given
-    ]
+    fields, hints = policy.__dataclass_fields__, hints_of(policy)
+    parameters = [f"  {p} = {_default(fields[p])!r}{_limits(hints.get(p))}" for p in policy.parameter_names()]
     title = f"{name}{' (reference)' if policy.reference else ''}: {policy.__module__}.{policy.__qualname__}"
     return "\n".join([title, "", _plain(inspect.getdoc(policy) or ""), "", "Defaults:", *(parameters or ["  none"])])
+
+
+def _default(field: dataclasses.Field[object]) -> object:
+    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+
+
+def _limits(hint: object) -> str:
+    """The bounds of a parameter, or the words that it can be."""
+    for kind, notes in parts_of(hint):
+        for note in notes:
+            if isinstance(note, Bounds) and str(note):
+                return f", {note}"
+        if typing.get_origin(kind) is typing.Literal:
+            return f", one of {', '.join(typing.get_args(kind))}"
+    return ""
 
 
 def _plain(text: str) -> str:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
-from baselines.policy.parameters import parameter
 from baselines.solvers.resolved_rate.base import APPLIED, NominalMemory, add_feedback, task_motion
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import FloatArray, number
+from ikgym.validation import Bounds, FloatArray
 
 
 class BroydenMemory(NamedTuple):
@@ -110,7 +109,7 @@ class Broyden(DampedLeastSquares):
         InvalidInputError: The gain, the damping or ε is out of its range.
     """
 
-    motion: float = parameter(1e-6, number, above=0.0)
+    motion: Annotated[float, Bounds(above=0.0)] = 1e-6
 
     name: ClassVar[str] = "broyden"
     step = broyden_step

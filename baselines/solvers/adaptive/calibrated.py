@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.filter_bank import ArmFilters, ChangeModel
 from ikgym.kernels import tasks as task_kernels
-from ikgym.validation import FloatArray, number
+from ikgym.validation import Bounds, FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,10 +40,10 @@ class Calibrated(ArmFilters):
         InvalidInputError: The base policy is a reference, or it refuses its parameters; a number is out of its range.
     """
 
-    pose_noise: float = parameter(3e-4, number, above=0.0)
-    pose_rotation_noise: float = parameter(5e-4, number, above=0.0)
-    walk: float = parameter(0.0, number, at_least=0.0)
-    jump: float = parameter(1e-3, number, at_least=0.0)
+    pose_noise: Annotated[float, Bounds(above=0.0)] = 3e-4
+    pose_rotation_noise: Annotated[float, Bounds(above=0.0)] = 5e-4
+    walk: Annotated[float, Bounds(at_least=0.0)] = 0.0
+    jump: Annotated[float, Bounds(at_least=0.0)] = 1e-3
 
     name: ClassVar[str] = "calibrated"
 

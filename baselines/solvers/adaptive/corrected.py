@@ -5,19 +5,18 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
-from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.deviation import SIZE, add_deviation
 from baselines.wrapper import NamedWrapper
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.tasks import pose_rows
 from ikgym.scenarios.preview import furthest
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import Bounds, FloatArray
 
 
 class Measurement(NamedTuple):
@@ -129,8 +128,8 @@ class Corrected(NamedWrapper, abc.ABC):
     """
 
     policy: str = "rhc_foresight"
-    history: int = parameter(64, whole_number, at_least=1)
-    blend: float = parameter(0.01, number, at_least=0.0)
+    history: Annotated[int, Bounds(at_least=1)] = 64
+    blend: Annotated[float, Bounds(at_least=0.0)] = 0.01
 
     @abc.abstractmethod
     def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray, old: FloatArray) -> Any:

@@ -6,18 +6,17 @@ import abc
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
-from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.kalman import absorb, linearise, prior_covariance, write_deviation
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import FloatArray, flag, float_array, number
+from ikgym.validation import Bounds, Flag, FloatArray, float_array, number
 
 #: Logarithm of the probability below which a filter is dropped.
 LEAST = -20.0
@@ -93,11 +92,11 @@ class ArmFilters(Corrected, abc.ABC):
         keep: Whether the estimate of the arm survives the start of an episode, and is cleared with the state alone.
     """
 
-    zero: float = parameter(5e-4, number, at_least=0.0)
-    link: float = parameter(3e-4, number, at_least=0.0)
-    axis: float = parameter(5e-4, number, at_least=0.0)
-    start: float | None = parameter(None, number, above=0.0)
-    keep: bool = parameter(False, flag)
+    zero: Annotated[float, Bounds(at_least=0.0)] = 5e-4
+    link: Annotated[float, Bounds(at_least=0.0)] = 3e-4
+    axis: Annotated[float, Bounds(at_least=0.0)] = 5e-4
+    start: Annotated[float, Bounds(above=0.0)] | None = None
+    keep: Flag = False
 
     @abc.abstractmethod
     def variances(self) -> FloatArray:
@@ -176,10 +175,10 @@ class FilterBank(ArmFilters):
         InvalidInputError: The base policy is a reference, or it refuses its parameters; a number is out of its range.
     """
 
-    noises: tuple[float, ...] = parameter((1e-5, 1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3), _noises)
-    alike: float = parameter(1e-3, number, at_least=0.0)
-    each: float = parameter(1e-2, number, at_least=0.0)
-    rate: float = parameter(0.2, number, at_least=0.0)
+    noises: Annotated[tuple[float, ...], _noises] = (1e-5, 1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3)
+    alike: Annotated[float, Bounds(at_least=0.0)] = 1e-3
+    each: Annotated[float, Bounds(at_least=0.0)] = 1e-2
+    rate: Annotated[float, Bounds(at_least=0.0)] = 0.2
 
     name: ClassVar[str] = "filter_bank"
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch
-from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.corrected import Corrected, Measurement
 from baselines.solvers.adaptive.deviation import SIZE, missing_deviation, move_deviation
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import forward
-from ikgym.validation import FloatArray, number
+from ikgym.validation import Bounds, FloatArray
 
 
 class OffsetMemory(NamedTuple):
@@ -62,7 +61,7 @@ class OffsetFree(Corrected):
             of its range.
     """
 
-    gain: float = parameter(0.05, number, above=0.0, at_most=1.0)
+    gain: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 0.05
 
     name: ClassVar[str] = "offset_free"
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Problem, Solution
-from baselines.policy.parameters import parameter
 from baselines.solvers.adaptive.drives import (
     DELAY,
     Hypotheses,
@@ -27,7 +26,7 @@ from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.scenarios.preview import furthest, offsets
-from ikgym.validation import FloatArray, flag, number, per_joint, whole_number
+from ikgym.validation import Bounds, Flag, FloatArray, per_joint
 
 #: By how much neighbouring lags differ.
 RATIO = 1.23
@@ -78,15 +77,15 @@ class Predicted(NamedWrapper):
         InvalidInputError: A number is out of its range, or the policy is a reference.
     """
 
-    delay: float | tuple[float, ...] = parameter(7.0, joint_numbers)
-    bandwidth: float | tuple[float, ...] | None = parameter(14.0, joint_numbers)
-    identify: bool = parameter(True, flag)
-    longest_delay: int = parameter(12, whole_number, at_least=0, at_most=LONGEST)
-    lowest_bandwidth: float = parameter(8.0, number, above=0.0)
-    gain: float = parameter(0.06, number, above=0.0, at_most=1.0)
-    oldest: int = parameter(0, whole_number, at_least=0, at_most=LONGEST)
-    reserve: float = parameter(0.0, number, at_least=0.0, below=1.0)
-    overdrive: float | None = parameter(None, number, at_least=1.0)
+    delay: Annotated[float | tuple[float, ...], joint_numbers] = 7.0
+    bandwidth: Annotated[float | tuple[float, ...], joint_numbers] | None = 14.0
+    identify: Flag = True
+    longest_delay: Annotated[int, Bounds(at_least=0, at_most=LONGEST)] = 12
+    lowest_bandwidth: Annotated[float, Bounds(above=0.0)] = 8.0
+    gain: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 0.06
+    oldest: Annotated[int, Bounds(at_least=0, at_most=LONGEST)] = 0
+    reserve: Annotated[float, Bounds(at_least=0.0, below=1.0)] = 0.0
+    overdrive: Annotated[float, Bounds(at_least=1.0)] | None = None
 
     name: ClassVar[str] = "predicted"
 

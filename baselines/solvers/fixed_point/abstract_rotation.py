@@ -6,14 +6,13 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from baselines.policy import Memory, Problem
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
-from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.solvers.linear_algebra import dot, transposed_product
@@ -23,7 +22,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, as_given, number, per_joint
+from ikgym.validation import Bounds, FloatArray, as_given, one_of, per_joint
 
 #: Vectors that 𝒩 rotates, with their numbers in the kernel.
 COUNTER_ROTATIONS = {"none": 0, "joints": 1, "task": 2}
@@ -184,14 +183,14 @@ class AbstractRotation(CompiledPolicy):
         UnknownNameError: There is no such counter-rotation, deformation or Jacobian.
     """
 
-    r_a: float = parameter(100.0, number, above=0.0)
-    lambda_a: float | None = parameter(None, number, above=0.0)
+    r_a: Annotated[float, Bounds(above=0.0)] = 100.0
+    lambda_a: Annotated[float, Bounds(above=0.0)] | None = None
     task_weights: float | Sequence[float] = 1.0
     joint_weights: float | Sequence[float] = 1.0
-    counter_rotation: str = parameter("joints", choice, available=COUNTER_ROTATIONS)
-    deformation: str = parameter("rotation", choice, available=DEFORMATIONS)
-    jacobian: str = parameter("step", choice, available=("step", "point"))
-    tolerance: float = parameter(1e-3, number, at_least=0.0)
+    counter_rotation: Annotated[str, one_of(COUNTER_ROTATIONS)] = "joints"
+    deformation: Annotated[str, one_of(DEFORMATIONS)] = "rotation"
+    jacobian: Literal["step", "point"] = "step"
+    tolerance: Annotated[float, Bounds(at_least=0.0)] = 1e-3
     #: λ_a, given or chosen.
     share: float = derived()
     #: The diagonal of ℱ. Shape (m,).

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
-from baselines.policy.parameters import choice, parameter
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
 from baselines.solvers.fixed_point.iteration import (
     TRANSFORMATIONS,
@@ -20,7 +19,7 @@ from baselines.solvers.fixed_point.iteration import (
     fixed_point_step,
 )
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, IntArray, number, read_only, whole_number
+from ikgym.validation import Bounds, FloatArray, IntArray, one_of, read_only, whole_number
 
 # The length in [m] of the paper's arm, to which its A belongs; on a shorter one it grows with 1/length².
 PAPERS_LENGTH = 1.3
@@ -67,14 +66,14 @@ class FixedPoint(CompiledPolicy):
         UnknownNameError: There is no such transformation.
     """
 
-    transformation: str = parameter("transpose", choice, available=TRANSFORMATIONS)
-    slope: float = parameter(0.5, number, above=-1.0, below=1.0)
-    a: float | None = parameter(None, number)
-    d: float = parameter(0.3, number)
-    iterations: int = parameter(10, whole_number, at_least=1)
-    tolerance: float = parameter(1e-6, number, at_least=0.0)
+    transformation: Annotated[str, one_of(TRANSFORMATIONS)] = "transpose"
+    slope: Annotated[float, Bounds(above=-1.0, below=1.0)] = 0.5
+    a: Annotated[float, Bounds()] | None = None
+    d: Annotated[float, Bounds()] = 0.3
+    iterations: Annotated[int, Bounds(at_least=1)] = 10
+    tolerance: Annotated[float, Bounds(at_least=0.0)] = 1e-6
     components: Sequence[int] | None = None
-    length: float | None = parameter(None, number, above=0.0)
+    length: Annotated[float, Bounds(above=0.0)] | None = None
     #: The number of the transformation in the kernel.
     code: int = derived()
     #: A, given or chosen.

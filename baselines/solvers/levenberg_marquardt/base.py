@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.levenberg_marquardt.damping import (
     RULES,
     DampingLaw,
@@ -21,7 +20,7 @@ from baselines.solvers.levenberg_marquardt.damping import (
     rule_defaults,
 )
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory, iteration_step
-from ikgym.validation import FloatArray, flag, number, whole_number
+from ikgym.validation import Bounds, Flag, FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,19 +71,19 @@ class DampedIteration(CompiledPolicy, abc.ABC):
     """
 
     rule: str = "constant"
-    damping: float | None = parameter(None, number, at_least=0.0)
-    growth: float | None = parameter(None, number, at_least=1.0)
-    decay: float | None = parameter(None, number, at_least=1.0)
-    threshold: float | None = parameter(None, number, above=0.0)
-    restart: bool | None = parameter(None, flag)
-    carry: bool | None = parameter(None, flag)
-    weight: float | None = parameter(None, number, above=0.0)
-    error_bounds: tuple[float, ...] | None = parameter(None, interval_bounds)
-    condition_bounds: tuple[float, ...] | None = parameter(None, interval_bounds)
-    dampings: tuple[Any, ...] | None = parameter(None, damping_table)
-    tolerance: float = parameter(1e-10, number, at_least=0.0)
-    iterations: int = parameter(500, whole_number, at_least=1)
-    one_step: bool = parameter(False, flag)
+    damping: Annotated[float, Bounds(at_least=0.0)] | None = None
+    growth: Annotated[float, Bounds(at_least=1.0)] | None = None
+    decay: Annotated[float, Bounds(at_least=1.0)] | None = None
+    threshold: Annotated[float, Bounds(above=0.0)] | None = None
+    restart: Flag | None = None
+    carry: Flag | None = None
+    weight: Annotated[float, Bounds(above=0.0)] | None = None
+    error_bounds: Annotated[tuple[float, ...], interval_bounds] | None = None
+    condition_bounds: Annotated[tuple[float, ...], interval_bounds] | None = None
+    dampings: Annotated[tuple[Any, ...], damping_table] | None = None
+    tolerance: Annotated[float, Bounds(at_least=0.0)] = 1e-10
+    iterations: Annotated[int, Bounds(at_least=1)] = 500
+    one_step: Flag = False
     #: The rule with its numbers.
     law: DampingLaw = derived()
     #: Whether λ is kept from period to period.

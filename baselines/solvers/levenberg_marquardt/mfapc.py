@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
-from baselines.policy.parameters import choice, parameter
 from baselines.solvers.levenberg_marquardt.base import DampedIteration
-from ikgym.validation import whole_number
+from ikgym.validation import Bounds
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,9 +46,9 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
 
     rule: str = "condition"
     iterations: int = 10
-    horizon: int = parameter(2, whole_number, at_least=1)
-    jacobians: str = parameter("predicted", choice, available=("predicted", "constant"))
-    stop: str = parameter("horizon", choice, available=("horizon", "first_point"))
+    horizon: Annotated[int, Bounds(at_least=1)] = 2
+    jacobians: Literal["predicted", "constant"] = "predicted"
+    stop: Literal["horizon", "first_point"] = "horizon"
 
     name: ClassVar[str] = "mfapc"
 

@@ -6,15 +6,14 @@ import abc
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.arms.limits import middle
-from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
+from ikgym.validation import Bounds, FloatArray, as_given, per_joint, read_only
 
 #: Largest motion to the posture, as a share of the joint motion that the task asks for.
 SECONDARY_SHARE = 0.5
@@ -49,13 +48,13 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         InvalidInputError: A number is out of its range.
     """
 
-    damping: float = parameter(3e-5, number, above=0.0)
-    lm_damping: float = parameter(1e-5, number, at_least=0.0)
-    secondary_gain: float | None = parameter(None, number, at_least=0.0)
+    damping: Annotated[float, Bounds(above=0.0)] = 3e-5
+    lm_damping: Annotated[float, Bounds(at_least=0.0)] = 1e-5
+    secondary_gain: Annotated[float, Bounds(at_least=0.0)] | None = None
     posture: float | Sequence[float] | None = None
     joint_weights: float | Sequence[float] | None = None
-    braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
-    rotation_weight: float = parameter(1.0, number, above=0.0)
+    braking_share: Annotated[float, Bounds(at_least=0.0, at_most=1.0)] = 0.5
+    rotation_weight: Annotated[float, Bounds(above=0.0)] = 1.0
     #: The part of the acceleration limits that the feedback assumes for braking; 0 where there are none.
     braking: float = derived()
     #: Largest secondary motion of the joints relative to the primary one; inf for any.

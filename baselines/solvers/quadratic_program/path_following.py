@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
@@ -33,7 +32,7 @@ from ikgym.kernels import tasks
 from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.validation import FloatArray, number, read_only
+from ikgym.validation import Bounds, FloatArray, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # Samples that the spline needs ahead.
@@ -168,9 +167,9 @@ class PathFollowing(VelocityProgram):
         InvalidInputError: A number is out of its range.
     """
 
-    lookahead: float = parameter(0.2, number, above=0.0, at_most=60.0)
-    longest_lateness: float = parameter(2.0, number, above=0.0, at_most=3600.0)
-    acceleration_share: float = parameter(0.9, number, above=0.0, at_most=1.0)
+    lookahead: Annotated[float, Bounds(above=0.0, at_most=60.0)] = 0.2
+    longest_lateness: Annotated[float, Bounds(above=0.0, at_most=3600.0)] = 2.0
+    acceleration_share: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 0.9
     #: Steps of the reference in a segment of the path ahead.
     stride: int = derived()
     #: Number of segments.
@@ -188,12 +187,15 @@ class PathFollowing(VelocityProgram):
     def __post_init__(self) -> None:
         super().__post_init__()
         dt, stride = self.problem.dt, max(2, math.ceil(self.preview / SEGMENTS))
+        acceleration = self.problem.model.acceleration_limit
+        change, limited = acceleration.copy(), np.isfinite(acceleration)
+        change[limited] *= self.acceleration_share * dt * dt
         self._settle(
             stride=stride,
             segments=self.preview // stride,
             latest=math.ceil(self.longest_lateness / dt),
             fastest=read_only(dt * self.problem.largest_qdot),
-            change=read_only(self.acceleration_share * dt * dt * self.problem.model.acceleration_limit),
+            change=read_only(change),
         )
 
     @property

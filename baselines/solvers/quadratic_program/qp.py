@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.quadratic_program.among_bodies import qp_step_among
 from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
@@ -16,7 +15,7 @@ from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
-from ikgym.validation import flag, number
+from ikgym.validation import Bounds, Flag
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
@@ -96,10 +95,10 @@ class QuadraticProgram(VelocityProgram):
         InvalidInputError: A number is out of its range.
     """
 
-    task_scaling: bool = parameter(False, flag)
-    clearance: float = parameter(0.005, number, at_least=0.0)
-    influence: float = parameter(0.2, number, above=0.0)
-    repulsion: float = parameter(10.0, number, at_least=0.0)
+    task_scaling: Flag = False
+    clearance: Annotated[float, Bounds(at_least=0.0)] = 0.005
+    influence: Annotated[float, Bounds(above=0.0)] = 0.2
+    repulsion: Annotated[float, Bounds(at_least=0.0)] = 10.0
 
     name: ClassVar[str] = "qp"
     step, step_among = qp_step, qp_step_among

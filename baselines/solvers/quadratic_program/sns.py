@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
@@ -18,7 +17,7 @@ from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky
-from ikgym.validation import FloatArray, number, read_only
+from ikgym.validation import Bounds, FloatArray, read_only
 
 SATURATED = int(Status.SATURATED)
 NONE = -1
@@ -141,9 +140,9 @@ class SaturationInNullSpace(ResolvedRate):
         InvalidInputError: A number is out of its range.
     """
 
-    damping: float = parameter(3e-5, number, at_least=0.0)
+    damping: Annotated[float, Bounds(at_least=0.0)] = 3e-5
     joint_weights: float | Sequence[float] | None = None
-    braking_share: float = parameter(0.5, number, at_least=0.0, at_most=1.0)
+    braking_share: Annotated[float, Bounds(at_least=0.0, at_most=1.0)] = 0.5
     #: See :class:`VelocityProgram`.
     braking: float = derived()
     #: Roots of the inverse weights of the joints. Shape (n,).

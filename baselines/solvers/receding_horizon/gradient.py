@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.policy.parameters import choice, parameter
 from baselines.policy_kernels import Model
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
@@ -26,7 +25,7 @@ from baselines.solvers.receding_horizon.horizon import analytic_gradient, differ
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.limits import FASTEST
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import Bounds, FloatArray
 
 # Smaller ones drown in the rounding of the states, which they change by Δt times as much.
 SMALLEST_DIFFERENCE = 1e-9
@@ -72,16 +71,16 @@ class RecedingHorizonGradient(SolverPolicy):
         UnknownNameError: There is no such gradient, start of α or warm start.
     """
 
-    horizon: int = parameter(3, whole_number, at_least=2)
-    tolerance: float = parameter(20.0, number, at_least=0.0)
-    iterations: int = parameter(450, whole_number, at_least=1)
-    alpha_min: float = parameter(1e-8, number, above=0.0)
-    alpha_max: float = parameter(5e-4, number, above=0.0)
-    alpha_factor: float = parameter(1.2, number, at_least=1.0)
-    alpha_start: str = parameter("restart", choice, available=("restart", "kept"))
-    warm_start: str = parameter("unshifted", choice, available=("unshifted", "shifted"))
-    gradient: str = parameter("finite_difference", choice, available=("finite_difference", "analytic"))
-    difference: float = parameter(1e-3, number, at_least=SMALLEST_DIFFERENCE, at_most=1.0)
+    horizon: Annotated[int, Bounds(at_least=2)] = 3
+    tolerance: Annotated[float, Bounds(at_least=0.0)] = 20.0
+    iterations: Annotated[int, Bounds(at_least=1)] = 450
+    alpha_min: Annotated[float, Bounds(above=0.0)] = 1e-8
+    alpha_max: Annotated[float, Bounds(above=0.0)] = 5e-4
+    alpha_factor: Annotated[float, Bounds(at_least=1.0)] = 1.2
+    alpha_start: Literal["restart", "kept"] = "restart"
+    warm_start: Literal["unshifted", "shifted"] = "unshifted"
+    gradient: Literal["finite_difference", "analytic"] = "finite_difference"
+    difference: Annotated[float, Bounds(at_least=SMALLEST_DIFFERENCE, at_most=1.0)] = 1e-3
 
     name: ClassVar[str] = "rhc_gradient"
     grain: ClassVar[int] = 1

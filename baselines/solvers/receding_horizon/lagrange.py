@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
@@ -33,7 +32,7 @@ from baselines.solvers.receding_horizon.task_constraints import (
 )
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.limits import FASTEST
-from ikgym.validation import flag
+from ikgym.validation import Flag
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         UnknownNameError: There is no such gradient, start of α or warm start.
     """
 
-    states: bool = parameter(False, flag)
+    states: Flag = False
 
     name: ClassVar[str] = "rhc_lagrange"
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +20,13 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.policy.surroundings import swept
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
-from ikgym.validation import FloatArray, IntArray, flag, number, read_only, whole_number
+from ikgym.validation import Bounds, Flag, FloatArray, IntArray, read_only
 
 # Range of the kernel's counters and random numbers.
 MOST = 2**31 - 1
@@ -97,19 +96,19 @@ class RecedingHorizon(CompiledPolicy):
         InvalidInputError: A parameter is out of its range.
     """
 
-    horizon: int = parameter(30, whole_number, at_least=2, at_most=FARTHEST)
-    iterations: int | None = parameter(None, whole_number, at_least=1, at_most=MOST)
-    move_blocks: int | None = parameter(None, whole_number, at_least=1)
-    terminal_weight: float = parameter(1.0, number, at_least=0.0)
-    stop_at_end: bool = parameter(False, flag)
-    starts: int = parameter(1, whole_number, at_least=1, at_most=MOST)
-    restart_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
-    seed: int = parameter(0, whole_number, at_least=0, at_most=MOST)
-    start_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
-    recovery_steps: int = parameter(0, whole_number, at_least=0, at_most=MOST)
-    rate_weight: float = parameter(0.0, number, at_least=0.0)
-    tolerance: float = parameter(1e-7, number, above=0.0)
-    clearance: float = parameter(1e-3, number, at_least=0.0)
+    horizon: Annotated[int, Bounds(at_least=2, at_most=FARTHEST)] = 30
+    iterations: Annotated[int, Bounds(at_least=1, at_most=MOST)] | None = None
+    move_blocks: Annotated[int, Bounds(at_least=1)] | None = None
+    terminal_weight: Annotated[float, Bounds(at_least=0.0)] = 1.0
+    stop_at_end: Flag = False
+    starts: Annotated[int, Bounds(at_least=1, at_most=MOST)] = 1
+    restart_steps: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
+    seed: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
+    start_steps: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
+    recovery_steps: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
+    rate_weight: Annotated[float, Bounds(at_least=0.0)] = 0.0
+    tolerance: Annotated[float, Bounds(above=0.0)] = 1e-7
+    clearance: Annotated[float, Bounds(at_least=0.0)] = 1e-3
 
     name: ClassVar[str] = "rhc"
     step, step_among = plan_step, plan_step_among

@@ -5,21 +5,20 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.parameters import parameter
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import FloatArray, number, per_joint
+from ikgym.validation import Bounds, FloatArray, per_joint
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
 # Joints count as slow below this share of the largest velocity, and how much costlier they are by default, see
@@ -58,7 +57,7 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
         InvalidInputError: The gain is not between 0 and 2.
     """
 
-    gain: float = parameter(1.0, number, above=0.0, below=2.0)
+    gain: Annotated[float, Bounds(above=0.0, below=2.0)] = 1.0
 
     def check_secondary_gain(self, gain: float, name: str = "secondary_gain") -> None:
         """Checks the gain of a secondary objective in [1/s] against the time step.

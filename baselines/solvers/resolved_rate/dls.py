@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
-from ikgym.validation import number
+from ikgym.validation import Bounds
 
 
 @inner
@@ -58,7 +57,7 @@ class DampedLeastSquares(ResolvedRate):
         InvalidInputError: The gain or the damping is out of its range.
     """
 
-    damping: float = parameter(1e-3, number, above=0.0)
+    damping: Annotated[float, Bounds(above=0.0)] = 1e-3
 
     name: ClassVar[str] = "dls"
     step = dls_step

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
@@ -18,7 +17,7 @@ from baselines.solvers.resolved_rate.base import (
     task_motion,
 )
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import number
+from ikgym.validation import Bounds
 
 
 @inner
@@ -120,7 +119,7 @@ class GramSchmidt(ResolvedRate):
         InvalidInputError: The gain or the truncation is out of its range.
     """
 
-    truncation: float = parameter(1e-3, number, at_least=0.0, below=1.0)
+    truncation: Annotated[float, Bounds(at_least=0.0, below=1.0)] = 1e-3
 
     name: ClassVar[str] = "gram_schmidt"
     step = gram_schmidt_step

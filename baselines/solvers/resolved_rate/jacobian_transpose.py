@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.arm_size import error_weights, radian
 from baselines.solvers.resolved_rate.base import (
     APPLIED,
@@ -20,7 +19,7 @@ from baselines.solvers.resolved_rate.base import (
     task_motion,
 )
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import FloatArray, number, read_only
+from ikgym.validation import Bounds, FloatArray, read_only
 
 
 @inner
@@ -97,8 +96,8 @@ class JacobianTranspose(ResolvedRate):
         InvalidInputError: The gain, the tolerance or the length is out of its range.
     """
 
-    rank_tolerance: float = parameter(1e-12, number, at_least=0.0)
-    length: float | None = parameter(None, number, above=0.0)
+    rank_tolerance: Annotated[float, Bounds(at_least=0.0)] = 1e-12
+    length: Annotated[float, Bounds(above=0.0)] | None = None
     #: The diagonal of W². Shape (e,).
     weights: FloatArray = derived()
 

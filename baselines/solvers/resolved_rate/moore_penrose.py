@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.policy.parameters import parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
@@ -20,7 +19,7 @@ from baselines.solvers.resolved_rate.base import (
     task_motion,
 )
 from ikgym.kernels.jit import kernel
-from ikgym.validation import FloatArray, number, read_only
+from ikgym.validation import Bounds, FloatArray, read_only
 
 
 @kernel
@@ -76,7 +75,7 @@ class MoorePenrose(Pseudoinverse):
         InvalidInputError: The gain or the tolerance is out of its range.
     """
 
-    rank_tolerance: float = parameter(1e-12, number, at_least=0.0, below=1.0)
+    rank_tolerance: Annotated[float, Bounds(at_least=0.0, below=1.0)] = 1e-12
 
     name: ClassVar[str] = "moore_penrose"
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.policy.parameters import choice, parameter
 from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, full_rank, say_deficient, task_motion
@@ -19,7 +18,7 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import FloatArray, as_given, number, per_joint, read_only
+from ikgym.validation import Bounds, FloatArray, as_given, one_of, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring")
 
@@ -137,12 +136,12 @@ class NullSpace(MoorePenrose):
         UnknownNameError: There is no such objective.
     """
 
-    objective: str | None = parameter(None, choice, available=OBJECTIVES)
-    secondary_gain: float = parameter(1.0, number, at_least=0.0)
+    objective: Annotated[str, one_of(OBJECTIVES)] | None = None
+    secondary_gain: Annotated[float, Bounds(at_least=0.0)] = 1.0
     posture: float | Sequence[float] | None = None
-    damping: float = parameter(1e-3, number, at_least=0.0)
-    influence: float = parameter(0.3, number, above=0.0)
-    repulsion: float = parameter(10.0, number, at_least=0.0)
+    damping: Annotated[float, Bounds(at_least=0.0)] = 1e-3
+    influence: Annotated[float, Bounds(above=0.0)] = 0.3
+    repulsion: Annotated[float, Bounds(at_least=0.0)] = 10.0
     #: How strongly each joint moves to its goal, relative to K. Shape (n,).
     joint_gain: FloatArray = derived()
     #: The joints' goal, in [rad] or [m]. Shape (n,).

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.resolved_rate.moore_penrose import Pseudoinverse
-from ikgym.validation import number
+from ikgym.validation import Bounds
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,7 +28,7 @@ class TruncatedSVD(Pseudoinverse):
         InvalidInputError: The gain or the threshold is out of its range.
     """
 
-    threshold: float = parameter(3e-3, number, at_least=0.0, below=1.0)
+    threshold: Annotated[float, Bounds(at_least=0.0, below=1.0)] = 3e-3
 
     name: ClassVar[str] = "truncated_svd"
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.rivals.base import WHOLE_POSES, Seen, Step
 from baselines.solvers.rivals.model_files import TIP, geom_name, urdf
 from baselines.solvers.rivals.solids import Solids, solids_of
 from baselines.solvers.rivals.task_program import TaskProgram
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import Bounds, FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,10 +32,10 @@ class Roboplan(TaskProgram):
         safe_displacement_gain: Of the barrier: damping by the squared norm of its Jacobian.
     """
 
-    tolerance: float = parameter(1e-6, number, above=0.0)
-    iterations: int = parameter(100, whole_number, at_least=1)
-    barrier_gain: float = parameter(20.0, number, above=0.0)
-    safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
+    tolerance: Annotated[float, Bounds(above=0.0)] = 1e-6
+    iterations: Annotated[int, Bounds(at_least=1)] = 100
+    barrier_gain: Annotated[float, Bounds(above=0.0)] = 20.0
+    safe_displacement_gain: Annotated[float, Bounds(at_least=0.0)] = 4e-4
 
     name: ClassVar[str] = "roboplan"
     keeps_acceleration: ClassVar[bool] = True

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from baselines.policy.parameters import parameter
 from baselines.solvers.rivals.base import Rival, Seen, Step
 from baselines.solvers.rivals.model_files import TIP, geom_name, joint_name, mjcf, urdf
 from baselines.solvers.rivals.solids import Solids, geometry_model, solids_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.validation import FloatArray, number
+from ikgym.validation import Bounds, FloatArray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -42,15 +41,15 @@ class TaskProgram(Rival, abc.ABC):
         MissingDependencyError: The package is not installed.
     """
 
-    gain: float = parameter(1.0, number, above=0.0, at_most=1.0)
-    position_cost: float = parameter(1.0, number, above=0.0)
-    orientation_cost: float = parameter(1.0, number, at_least=0.0)
-    lm_damping: float = parameter(1.0, number, at_least=0.0)
-    posture_cost: float = parameter(1e-3, number, at_least=0.0)
-    posture_rate: float = parameter(1.0, number, at_least=0.0)
-    damping: float = parameter(1e-12, number, at_least=0.0)
-    limit_gain: float = parameter(0.5, number, above=0.0, at_most=1.0)
-    clearance: float = parameter(0.005, number, at_least=0.0)
+    gain: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 1.0
+    position_cost: Annotated[float, Bounds(above=0.0)] = 1.0
+    orientation_cost: Annotated[float, Bounds(at_least=0.0)] = 1.0
+    lm_damping: Annotated[float, Bounds(at_least=0.0)] = 1.0
+    posture_cost: Annotated[float, Bounds(at_least=0.0)] = 1e-3
+    posture_rate: Annotated[float, Bounds(at_least=0.0)] = 1.0
+    damping: Annotated[float, Bounds(at_least=0.0)] = 1e-12
+    limit_gain: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 0.5
+    clearance: Annotated[float, Bounds(at_least=0.0)] = 0.005
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,8 +111,8 @@ class Pink(SolverProgram):
     """
 
     solver: str = "quadprog"
-    barrier_gain: float = parameter(20.0, number, above=0.0)
-    safe_displacement_gain: float = parameter(4e-4, number, at_least=0.0)
+    barrier_gain: Annotated[float, Bounds(above=0.0)] = 20.0
+    safe_displacement_gain: Annotated[float, Bounds(at_least=0.0)] = 4e-4
 
     name: ClassVar[str] = "pink"
     keeps_acceleration: ClassVar[bool] = True
@@ -171,8 +170,8 @@ class Mink(SolverProgram):
     """
 
     limit_gain: float = 0.95
-    collision_gain: float = parameter(0.85, number, above=0.0, at_most=1.0)
-    detection_distance: float = parameter(0.01, number, above=0.0)
+    collision_gain: Annotated[float, Bounds(above=0.0, at_most=1.0)] = 0.85
+    detection_distance: Annotated[float, Bounds(above=0.0)] = 0.01
 
     name: ClassVar[str] = "mink"
     package: ClassVar[str] = "mink"

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Solution
-from baselines.policy.parameters import parameter
 from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import FloatArray, number
+from ikgym.validation import Bounds, FloatArray
 
 
 class SmoothedMemory(NamedTuple):
@@ -61,7 +60,7 @@ class Smoothed(NamedWrapper):
     """
 
     policy: str = "rhc_gradient"
-    relaxation: float = parameter(300.0, number, above=0.0)
+    relaxation: Annotated[float, Bounds(above=0.0)] = 300.0
 
     name: ClassVar[str] = "smoothed"
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, Points
-from ikgym.validation import FloatArray, Positive, Rotation, Vector, number, whole_number
+from ikgym.validation import Bounds, FloatArray, Positive, Rotation, Vector, number
 
 # Corners that turn by less than this, in [rad], are none.
 STRAIGHT = 1e-9
@@ -175,7 +175,7 @@ class Raster(Outline):
     center: Vector
     width: Positive
     height: Positive
-    lines: Annotated[int, functools.partial(whole_number, at_least=2, at_most=MOST_POINTS // 2)]
+    lines: Annotated[int, Bounds(at_least=2, at_most=MOST_POINTS // 2)]
     corner_radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 

@@ -169,7 +169,7 @@ def test_members_are_shown_and_files_like_members(tmp_path, monkeypatch, capsys)
 
     text = shown("policies", "dls")
     assert "    damping: λ, added to J Jᵀ as it is" in text
-    assert text.endswith("Defaults:\n  gain = 1.0\n  damping = 0.001\n")
+    assert text.endswith("Defaults:\n  gain = 1.0, above 0 and below 2\n  damping = 0.001, above 0\n")
     text = shown("arms", "varga7")
     assert "varga7: 7 joints, tool at (5.5, 0, 2) m, its x axis along (" in " ".join(text.split())
     assert re.search(r"^joint_3 +prismatic +none +none +none +none$", text, re.MULTILINE)
