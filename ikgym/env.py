@@ -42,6 +42,7 @@ class Arms:
         """Takes the arguments of an environment; returns the observation and the action space of one arm."""
         self.scenario, self.render_mode = scenarios.find(scenario), render_mode
         self._spec: EnvSpec | None = None
+        self._most_steps = self.scenario.steps
         # First, since it checks the memory.
         self._simulator = Simulator(self.scenario, rows, preview, commands=commands)
         self.lost_distance = checked_distance(lost_distance)
@@ -64,7 +65,7 @@ class Arms:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = None if spec is None else dataclasses.replace(spec, max_episode_steps=self.scenario.steps)
+        self._spec = None if spec is None else dataclasses.replace(spec, max_episode_steps=self._most_steps)
 
 
 class RedundantIKEnv(Arms, gym.Env[Any, Any]):

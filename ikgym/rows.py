@@ -18,10 +18,10 @@ Infos = dict[str, Any]
 
 
 class Hinting(type):
-    """Adds a hint to the class name, which is all that Stable-Baselines3 shows of an environment that it refuses."""
+    """Adds a hint to the class in f-strings: Stable-Baselines3 shows no more of an environment that it refuses."""
 
-    def __repr__(cls) -> str:
-        return f"{super().__repr__()[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
+    def __format__(cls, _: str) -> str:
+        return f"{repr(cls)[:-1]}; for Stable-Baselines3 there is ikgym.sb3.RedundantIKVecEnv>"
 
 
 def contexts(context: FloatArray, rows: BoolArray) -> Infos:

@@ -83,6 +83,7 @@ class RedundantIKVecEnv(VecEnv):
         self._returns, self._lengths = np.zeros(envs.num_envs), np.zeros(envs.num_envs, dtype=np.int64)
         self._made = time.perf_counter()
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+        self.metadata |= {"render_fps": envs.metadata["render_fps"]}
 
     def reset(self) -> Observation:
         """Begins episodes in all rows, with the seeds and options of `seed()` and `set_options()`.
@@ -200,17 +201,19 @@ class LearningVecEnv(RedundantIKVecEnv):
         num_envs: N.
         task: Observation, action and reward.
         render_mode: None or `"rgb_array"`.
+        render_fps: Pictures per second of a video.
 
     Raises:
         UnknownNameError: There is no such scenario.
         InvalidInputError: A value is refused.
     """
 
-    def __init__(self, num_envs: int, task: rl.Task, render_mode: str | None = None) -> None:
+    def __init__(
+        self, num_envs: int, task: rl.Task, render_mode: str | None = None, render_fps: int | None = None
+    ) -> None:
         self.task = task
-        self._take(
-            rl.LearningVectorEnv(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=render_mode)
-        )
+        mode = AutoresetMode.SAME_STEP
+        self._take(rl.LearningVectorEnv(num_envs, task, render_fps, autoreset_mode=mode, render_mode=render_mode))
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """One picture a row, for `VecVideoRecorder` and `render()`."""
@@ -218,7 +221,7 @@ class LearningVecEnv(RedundantIKVecEnv):
 
 
 def make_vec(
-    scenario: str | Scenario, num_envs: int = 1, *, render_mode: str | None = None, **changes: Any
+    env: str | Scenario | None = None, num_envs: int = 1, *, render_mode: str | None = None, **changes: Any
 ) -> LearningVecEnv:
     """N arms, for learning, for Stable-Baselines3.
 
@@ -227,8 +230,8 @@ def make_vec(
     >>> model = PPO("MlpPolicy", make_vec("ikgym/Track-v0", 8))
 
     Args:
-        scenario: A scenario or its name, see `ikgym.scenarios.find`; or an environment by its id, whose N single ones
-            in a `DummyVecEnv` are the same bit for bit.
+        env: A scenario or its name, see `ikgym.scenarios.find`, also by the keyword `scenario`; or an environment by
+            its id, whose N single ones in a `DummyVecEnv` are the same bit for bit.
         num_envs: N.
         render_mode: None or `"rgb_array"`.
         changes: Fields of :class:`ikgym.rl.Task` with other values.
@@ -237,9 +240,13 @@ def make_vec(
         UnknownNameError: There is no such scenario or field.
         InvalidInputError: A value is refused.
     """
-    by_id = isinstance(scenario, str) and scenario in rl.IDS
-    task = rl.IDS[str(scenario)].task if by_id else rl.Task(scenario)
-    return LearningVecEnv(num_envs, task.replace(**changes), render_mode)
+    kind = rl.IDS.get(env.removeprefix("ikgym:")) if isinstance(env, str) else None
+    if kind is not None:
+        return LearningVecEnv(num_envs, kind.change_task(changes), render_mode, kind.metadata["render_fps"])
+    if env is not None and "scenario" in changes:
+        raise InvalidInputError(f"scenario: expected one, got {env!r} and {changes['scenario']!r}.")
+    given = {} if env is None else {"scenario": env}
+    return LearningVecEnv(num_envs, rl.Task().replace(**given, **changes), render_mode)
 
 
 def _plain(value: Any) -> Any:

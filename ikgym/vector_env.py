@@ -48,7 +48,7 @@ class RedundantIKVectorEnv(
         autoreset_mode: A mode of Gymnasium, or its value such as ``"SameStep"``.
         render_mode: None or `"rgb_array"`: :meth:`render` draws each row, which Gymnasium's `RecordVideo` of vector
             environments puts side by side.
-        max_episode_steps: None or the scenario's own number of steps, as Gymnasium hands it over from a `spec`.
+        max_episode_steps: Steps after which an episode is truncated, if that is before its end; None for its end.
         commands: h, the number of past commands shown.
         lost_distance: Position error in [m] beyond which an episode ends; None for never.
 
@@ -79,16 +79,15 @@ class RedundantIKVectorEnv(
         own = {"render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.metadata = RedundantIKEnv.metadata | own
         one = self._set_arms(scenario, self.num_envs, preview, commands, lost_distance, render_mode)
-        if max_episode_steps not in (None, self.scenario.steps):
-            raise InvalidInputError(
-                f"max_episode_steps: expected the {self.scenario.steps} of the scenario, got {max_episode_steps!r}."
-            )
+        if max_episode_steps is not None:
+            self._most_steps = min(self._most_steps, whole_number("max_episode_steps", max_episode_steps, at_least=1))
         self.single_observation_space, self.single_action_space = one
         self.observation_space, self.action_space = (batch_space(space, self.num_envs) for space in one)
         self._generators: dict[int, np.random.Generator] = {}
         self._seeds: dict[int, int] = {}
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        self._entered = np.zeros(self.num_envs, dtype=np.int64)
 
     @property
     def context(self) -> FloatArray:
@@ -162,7 +161,7 @@ class RedundantIKVectorEnv(
         rewards = -out.cost
         rewards[waiting] = 0.0
         made = self._simulator.steps_made
-        over = stepping & (made == self.scenario.steps)
+        over = stepping & ((made == self.scenario.steps) | (made - self._entered >= self._most_steps))
         lost = stepping & lost_rows(out, self.lost_distance)
         ended = over | lost
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP and bool(ended.any())
@@ -203,7 +202,7 @@ class RedundantIKVectorEnv(
             "scenario": self.scenario,
             "observation_space": self.single_observation_space,
             "action_space": self.single_action_space,
-            "metadata": RedundantIKEnv.metadata,
+            "metadata": RedundantIKEnv.metadata | {"render_fps": self.metadata["render_fps"]},
             "render_mode": self.render_mode,
         }
         own = ("np_random", "np_random_seed")
@@ -225,6 +224,7 @@ class RedundantIKVectorEnv(
 
     def _begin(self, mask: BoolArray, **chosen: Any) -> None:
         self._simulator.reset(mask, self._generators, **chosen)
+        self._entered[mask] = self._simulator.steps_made[mask]
         self._begun |= mask
         self._ended = self._ended & ~mask
 

@@ -205,3 +205,11 @@ def test_the_vector_environment_of_gymnasium_is_another_one():
     envs = gym.make_vec("RedundantIK-v0", num_envs=2, scenario=noisy())
     with pytest.raises(ValueError, match=r"ikgym\.sb3\.RedundantIKVecEnv"):
         DummyVecEnv([lambda: envs])
+
+
+def test_scenarios_are_given_once():
+    by_keyword = make_vec(scenario="learning-track", num_envs=2)
+    assert (by_keyword.scenario.name, by_keyword.num_envs) == ("learning-track", 2)
+    assert make_vec("ikgym:ikgym/Fast-v0").scenario.name == "learning-fast"
+    with pytest.raises(InvalidInputError, match="scenario: expected one, got 'learning-track' and 'panda-random'"):
+        make_vec("learning-track", scenario="panda-random")

@@ -23,7 +23,7 @@ from ikgym.vector_env import RedundantIKVectorEnv
 FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
 
 
-class LearningEnv(RedundantIKEnv):
+class LearningEnv(RedundantIKEnv, gym.Env[Any, Any]):  # listed, since skrl looks for Gymnasium among the bases
     """One arm, for learning; `info` is that of :class:`ikgym.RedundantIKEnv`, whose costs are the benchmark's.
 
     Args:
@@ -54,12 +54,13 @@ class LearningEnv(RedundantIKEnv):
         return self._learner.observe(_one_row(seen), self.context[None], LATER)[0], reward, terminated, truncated, info
 
 
-class LearningVectorEnv(RedundantIKVectorEnv):
+class LearningVectorEnv(RedundantIKVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     """N arms, for learning, stepped by one kernel; bit for bit a `SyncVectorEnv` of :class:`LearningEnv`.
 
     Args:
         num_envs: N.
         task: Observation, action and reward.
+        render_fps: Pictures per second of a video.
         options: `autoreset_mode`, `render_mode` and `max_episode_steps` of :class:`ikgym.RedundantIKVectorEnv`.
 
     Raises:
@@ -67,8 +68,9 @@ class LearningVectorEnv(RedundantIKVectorEnv):
         InvalidInputError: A value is refused.
     """
 
-    def __init__(self, num_envs: int, task: Task, **options: Any) -> None:
+    def __init__(self, num_envs: int, task: Task, render_fps: int | None = None, **options: Any) -> None:
         super().__init__(num_envs, **_arguments(task), **options)
+        self.metadata["render_fps"] = render_fps or self.metadata["render_fps"]
         self.task, self._none = task, np.zeros(num_envs, dtype=np.bool_)
         self._learner = Learner(task, self.scenario, self.preview, self.single_observation_space, num_envs)
         self.single_observation_space = self._learner.observation_space

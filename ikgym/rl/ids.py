@@ -6,8 +6,9 @@ from typing import Any, ClassVar
 
 import gymnasium as gym
 
+from ikgym import scenarios
 from ikgym.env import RedundantIKEnv
-from ikgym.exceptions import UnexpectedArgumentError, UnknownNameError
+from ikgym.exceptions import InvalidInputError, UnexpectedArgumentError, UnknownNameError
 from ikgym.rl.envs import LearningEnv, LearningVectorEnv
 from ikgym.rl.task import Task
 
@@ -31,7 +32,7 @@ class TaskEnv(LearningEnv):
     metadata: ClassVar[dict[str, Any]] = {**RedundantIKEnv.metadata, "render_fps": 100}  # type: ignore[misc]
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
-        super().__init__(self._change_task(changes), render_mode)
+        super().__init__(self.change_task(changes), render_mode)
 
     @classmethod
     def arms(cls, num_envs: int = 1, **options: Any) -> LearningVectorEnv:
@@ -44,14 +45,28 @@ class TaskEnv(LearningEnv):
         """
         known = ("autoreset_mode", "render_mode", "max_episode_steps")
         others = {name: options.pop(name) for name in known if name in options}
-        return LearningVectorEnv(num_envs, cls._change_task(options), **others)
+        return LearningVectorEnv(num_envs, cls.change_task(options), cls.metadata["render_fps"], **others)
 
     @classmethod
-    def _change_task(cls, changes: dict[str, Any]) -> Task:
+    def change_task(cls, changes: dict[str, Any]) -> Task:
+        """The task with other values of some fields.
+
+        Raises:
+            UnexpectedArgumentError: There is no such field.
+            InvalidInputError: A value is refused, or the scenario has another number of steps, after which Gymnasium
+                would end its episodes.
+        """
         try:
-            return cls.task.replace(**changes)
+            task = cls.task.replace(**changes)
         except UnknownNameError as e:
             raise UnexpectedArgumentError(f"got an unexpected keyword argument {e.name!r}. {e}") from None
+        scenario = scenarios.find(task.scenario)
+        if scenario.steps != cls.steps:
+            raise InvalidInputError(
+                f"scenario: expected {cls.steps} steps, where Gymnasium ends the episodes of this id, got "
+                f"{scenario.steps} of {scenario.name!r}; ikgym.rl.make and make_vec take any scenario."
+            )
+        return task
 
 
 class ReachEnv(TaskEnv):

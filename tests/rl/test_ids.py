@@ -14,15 +14,19 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import ikgym
 from baselines.episodes import Simulation
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
 from ikgym.rl.task import steps_ahead
+from ikgym.sb3 import make_vec
 from tests.comparison import identical, played_alike, random_actions
 
 N = 3
+SPAWN = {"start_method": "spawn"}
 SIZES = {"Reach": 26, "Track": 38, "Fast": 38, "Limits": 38, "Camera": 272, "Payload": 272}
 
 every_id = pytest.mark.parametrize("name", IDS)
@@ -197,6 +201,59 @@ def test_fields_of_the_task_can_be_changed():
         with pytest.raises(IkgymError, match="Did you mean 'history'") as refused:
             make("ikgym/Track-v0", histroy=2)
         assert isinstance(refused.value, TypeError)  # as other libraries expect who try keywords
+
+
+@pytest.mark.slow
+def test_workers_of_stable_baselines3_find_it_by_its_module():
+    envs = make_vec_env("ikgym:ikgym/Track-v0", 1, seed=4, vec_env_cls=SubprocVecEnv, vec_env_kwargs=SPAWN)
+    try:
+        seen = envs.reset()
+        assert identical(seen, ikgym.rl.make_vec("learning-track", 1).reset(seed=4)[0])
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_episodes_are_truncated_early_as_by_the_wrapper_of_gymnasium(mode):
+    """Counted from the reset on, also where an episode is entered later; and no later than the scenario ends."""
+    for steps, entry in ((7, {}), (7, {"step": 5}), (500, {"step": 190})):
+        ours = gym.make_vec("ikgym/Track-v0", 2, max_episode_steps=steps, autoreset_mode=mode)
+        makers = [functools.partial(gym.make, "ikgym/Track-v0", max_episode_steps=steps)] * 2
+        theirs = SyncVectorEnv(makers, autoreset_mode=mode)
+        assert ours.spec.max_episode_steps == min(steps, 200)
+        assert identical(ours.reset(seed=4, options=entry)[0], theirs.reset(seed=4, options=entry)[0])
+        truncated = 0
+        for actions in actions_of(theirs, 18):
+            ended = ours.step(actions)
+            assert identical(ended[:4], theirs.step(actions)[:4])
+            truncated += ended[3].sum()
+        assert truncated == (4 if steps == 7 else 2)
+    with pytest.raises(IkgymError, match="max_episode_steps: expected a whole number of at least 1, got 0"):
+        gym.make_vec("ikgym/Track-v0", 2, max_episode_steps=0)
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec, make_vec], ids=["make", "make_vec", "sb3"])
+def test_another_scenario_has_to_end_where_the_id_does(make):
+    late = ikgym.scenarios.get("learning-track").replace(plant=ikgym.Plant(command_delay=1))
+    make("ikgym/Track-v0", scenario=late)
+    with pytest.raises(IkgymError, match=r"expected 200 steps, .* got 1000 of 'panda-random'; ikgym\.rl\.make"):
+        make("ikgym/Track-v0", scenario="panda-random")
+
+
+@every_id
+def test_videos_of_vectors_are_as_fast_as_those_of_one_arm(name):
+    speed = gym.make(name).metadata["render_fps"]
+    envs = gym.make_vec(name, 2)
+    assert envs.metadata["render_fps"] == envs.get_attr("metadata")[0]["render_fps"] == speed
+    assert make_vec(name, 2).metadata["render_fps"] == speed
+
+
+def test_the_bases_of_environments_are_plain_and_lead_to_gymnasium():
+    """As automatic wrappers of other libraries, such as that of skrl, look for it."""
+    for env in (ikgym.rl.make("learning-track"), gym.make_vec("ikgym/Track-v0", 2).unwrapped):
+        bases = [str(base) for base in type(env).__bases__]
+        assert any(base.startswith("<class 'gymnasium.") for base in bases)
+        assert all(base.endswith("'>") for base in bases)
 
 
 def test_importing_again_registers_nothing_twice():
