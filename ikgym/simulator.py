@@ -16,12 +16,11 @@ from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, out
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
 from ikgym.machine import check_memory, in_chunks, of_rows
-from ikgym.options import take_actions
+from ikgym.options import checked_starts, checked_steps, entered_states, take_actions
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.plant.step import step
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
-from ikgym.scenarios.entering import checked_starts, checked_steps, entered_states
 from ikgym.scenarios.frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets

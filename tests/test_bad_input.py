@@ -17,9 +17,8 @@ from ikgym.arms.bodies import MOST_BODIES, Bodies
 from ikgym.exceptions import IkgymError
 from ikgym.frozen import Frozen
 from ikgym.obstacles import KINDS as OBSTACLES
-from ikgym.obstacles import Box, Capsule, HalfSpace, RandomBoxes, Sphere
+from ikgym.obstacles import MOST_OBSTACLES, Box, Capsule, HalfSpace, RandomBoxes, Sphere
 from ikgym.plant import Plant
-from ikgym.scenarios.checks import MOST_OBSTACLES
 from ikgym.trajectories import (
     KINDS,
     AlongPath,

@@ -19,7 +19,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.durations import duration
+from ikgym.scenarios.scenario import duration
 from ikgym.simulator import Simulator
 from ikgym.trajectories import Trajectory
 from ikgym.validation import FloatArray

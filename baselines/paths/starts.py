@@ -9,7 +9,6 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles.solids import closest
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.contacts import pair_names
 from ikgym.trajectories import RetimedTrajectory
 from ikgym.validation import FloatArray
 
@@ -50,7 +49,7 @@ def _clear(scenario: Scenario, own: FloatArray, found: FloatArray) -> tuple[Floa
     clear = pairs.distances > 0.0
     if not clear.any():
         best = int(np.argmax(pairs.distances))
-        first, second = pair_names(scenario, pairs.pairs[best].tolist())
+        first, second = scenario.pair_names(pairs.pairs[best].tolist())
         raise InvalidInputError(
             f"Scenario {scenario.name!r}: expected a posture at the first pose that touches nothing, got none among "
             f"{len(every)}; in the best of them {first!r} and {second!r} overlap by {-1e3 * pairs.distances[best]:.3g} "

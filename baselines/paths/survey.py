@@ -14,7 +14,6 @@ from baselines.paths.starts import starts
 from baselines.paths.timing import Timing, grid, shortest
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray, number
 
 #: Errors in [m] and [rad] within which a pose of the path counts as reached.
@@ -281,5 +280,5 @@ def _contact(scenario: Scenario, motion: Motion, slowing: float) -> Contact | No
     stops = np.flatnonzero(motion.stopped[:, 0])
     until = motion.clearance[: stops[0] + 1, 0] if len(stops) else motion.clearance[:, 0]
     step = int(stops[0] if len(stops) else until.argmin())
-    pair = pair_names(scenario, motion.pair[step, 0].tolist())
+    pair = scenario.pair_names(motion.pair[step, 0].tolist())
     return Contact(float(until.min()), pair, float(motion.times[step + 1]) / slowing, len(stops) > 0)

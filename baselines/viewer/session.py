@@ -15,7 +15,6 @@ from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
 from baselines.viewer.replay import Stage, play_all
 from ikgym.obstacles.solids import Closest, closest
-from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.
@@ -178,7 +177,7 @@ class Session:
             margin = f"{reading.margins[joint]:.3g} {'m' if arm.prismatic[joint] else 'rad'}"
             lines.append(f"- {escaped(arm.joint_names[joint])} is {margin} from its limit")
         if self.stage.scenario.collides and np.isfinite(one.closest.distances[0]):
-            pair = pair_names(self.stage.scenario, one.closest.pairs[0].tolist())
+            pair = self.stage.scenario.pair_names(one.closest.pairs[0].tolist())
             lines.append(f"- {1e3 * one.closest.distances[0]:.1f} mm between {' and '.join(map(escaped, pair))}")
         if np.isfinite(one.cost):
             lines.append(f"- cost so far {one.cost:.4g}")

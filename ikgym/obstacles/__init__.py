@@ -5,8 +5,10 @@ from __future__ import annotations
 from ikgym.obstacles.obstacle import Box, Capsule, HalfSpace, Obstacle, Sphere
 from ikgym.obstacles.random_boxes import RandomBoxes
 
-__all__ = ["KINDS", "Box", "Capsule", "HalfSpace", "Obstacle", "RandomBoxes", "Sphere"]
+__all__ = ["KINDS", "MOST_OBSTACLES", "Box", "Capsule", "HalfSpace", "Obstacle", "RandomBoxes", "Sphere"]
 
+#: Most obstacles of a scenario.
+MOST_OBSTACLES = 1000
 #: The kinds of obstacles by their names in scenario files.
 KINDS: dict[str, type[Obstacle]] = {
     "sphere": Sphere,

@@ -16,15 +16,19 @@ import os
 import pathlib
 from collections.abc import Callable
 
-from ikgym import problems
+import numpy as np
+
+from ikgym import arms, problems
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.files import read_user_toml
+from ikgym.obstacles import Box
 from ikgym.registry import Registry
-from ikgym.scenarios import files, published
-from ikgym.scenarios.durations import duration
+from ikgym.scenarios import files
 from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
-from ikgym.scenarios.scenario import Scenario
+from ikgym.scenarios.scenario import Scenario, duration
+from ikgym.trajectories import PublishedPath
+from ikgym.trajectories.orientations import matrices
 from ikgym.validation import known_name, shortened, whole_number
 
 __all__ = [
@@ -51,6 +55,10 @@ FILES = {
     family: sorted((pathlib.Path(__file__).parent / "catalogue" / family).glob("*.toml"), key=lambda file: file.stem)
     for family in ("papers", "paths", "plants", "bodies", "published", "learning")
 }
+#: Scenarios of the problems of others that have no file differ from these in their problem alone, by the beginning of
+#: the name; from waypoint to waypoint they take a period, in [s].
+LIKE = {"rlitg": "rlitg-hello", "cppflow-fetch": "cppflow-fetch-hello", "cppflow-panda": "cppflow-panda-square"}
+PERIOD = 0.2
 
 
 def load(file: str | os.PathLike[str]) -> Scenario:
@@ -196,8 +204,24 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
 
 
 def _published(problem: str) -> Scenario:
-    return published.scenario(
-        problem, next(get(name) for key, name in published.LIKE.items() if problem.startswith(key))
+    """The scenario of a problem that has no file; a collision with its obstacles stops the arm.
+
+    Bodies are those of our arms, and not the publishers'. Among obstacles the Panda has its hand.
+    """
+    like = next(get(name) for beginning, name in LIKE.items() if problem.startswith(beginning))
+    arm = like.arm
+    if arm.name == "panda":
+        arm = arms.get("panda-hand").replace(tool=arm.tool, acceleration_limit=arm.acceleration_limit)
+    rows = problems.boxes(problem)
+    zeros = np.zeros((2, len(rows)))
+    turned = matrices(np.column_stack([np.cos(0.5 * rows[:, 6]), *zeros, np.sin(0.5 * rows[:, 6])]))
+    return like.replace(
+        name=problem,
+        arm=arm,
+        trajectory=PublishedPath(problem, PERIOD),
+        steps=round(PERIOD / like.dt) * (len(problems.waypoints(problem).positions) - 1),
+        start=None,
+        obstacles=[Box(f"box {i + 1}", row[:3], row[3:6], turned[i]) for i, row in enumerate(rows)],
     )
 
 

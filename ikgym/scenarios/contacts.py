@@ -72,18 +72,12 @@ def draw_obstacles(
         contacts.boxes[row][:, drawn] = own[drawn]
 
 
-def pair_names(scenario: Scenario, pair: Sequence[int]) -> tuple[str, str]:
-    """The names of a pair that :meth:`ikgym.Arm.clearance` or an outcome has."""
-    names = (*scenario.arm.bodies.names, *(one for obstacle in scenario.obstacles for one in obstacle.names))
-    return names[pair[0]], names[pair[1]]
-
-
 def check_clear(scenario: Scenario, out: Outcome, active: BoolArray, q: FloatArray) -> None:
     """Checks that arms touch nothing at the start of their episodes; shapes (N,) and (N, n)."""
     touching = np.flatnonzero(active & (out.clearance <= 0.0) & (out.stopped == 0.0))
     if len(touching):
         row = int(touching[0])
-        first, second = pair_names(scenario, out.pair[row].astype(np.int64).tolist())
+        first, second = scenario.pair_names(out.pair[row].astype(np.int64).tolist())
         raise InvalidInputError(
             f"Start of scenario {scenario.name!r}: expected an arm that touches nothing, got {first!r} and {second!r} "
             f"with {1e3 * out.clearance[row]:.3g} mm between them at q = {q[row].tolist()}. A pair that may touch is "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import json
 import logging
 import os
 import pathlib
@@ -22,10 +23,8 @@ from ikgym.arms.checks import numbered_joints
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
-from ikgym.obstacles import Obstacle
+from ikgym.obstacles import MOST_OBSTACLES, Obstacle
 from ikgym.plant import Plant
-from ikgym.scenarios.checks import MOST_OBSTACLES
-from ikgym.scenarios.toml import document
 from ikgym.tasks import Task
 from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
 from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
@@ -274,3 +273,41 @@ def _same(one: Arm, other: Arm) -> bool:
 def _bytes(part: Arm | Bodies, names: Iterable[str] = ()) -> list[bytes]:
     fields = names or [f.name for f in dataclasses.fields(part) if f.init and f.name not in ("name", "bodies")]
     return [np.asarray(getattr(part, name)).tobytes() for name in fields]
+
+
+def document(values: Mapping[str, Any]) -> str:
+    """The text of a TOML file, in which every number reads as the very same number.
+
+    Values are texts, truth values, numbers, arrays, sequences of them, and mappings, which become tables; None is left
+    out. Keys consist of letters, digits and ``_``.
+    """
+    return "\n".join(_lines(values, "")) + "\n"
+
+
+def _lines(values: Mapping[str, Any], within: str) -> list[str]:
+    """The lines of a table, its own values first."""
+    given = {key: value for key, value in values.items() if value is not None}
+    lines = [f"{key} = {_text(value)}" for key, value in given.items() if not isinstance(value, Mapping)]
+    for key, value in given.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{within}{key}]", *_lines(value, f"{within}{key}.")]
+    return lines
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        # JSON escapes all that TOML wants escaped but the character 127.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, (int, np.integer)):
+        return repr(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    if isinstance(value, Mapping):  # in a list of tables
+        return "{ " + ", ".join(f"{key} = {_text(part)}" for key, part in value.items() if part is not None) + " }"
+    if isinstance(value, np.ndarray) and value.ndim > 1:
+        return "[\n" + "".join(f"  {_text(row)},\n" for row in value) + "]"
+    if isinstance(value, Iterable):
+        return "[" + ", ".join(map(_text, value)) + "]"
+    raise TypeError(f"{value!r} has no form in TOML.")  # a fault of ours: callers pass nothing else

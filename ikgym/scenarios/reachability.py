@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.scenarios.scenario import Scenario
-from ikgym.scenarios.starts import distances
+from ikgym.scenarios.scenario import Scenario, distances
 from ikgym.validation import whole_number
 
 

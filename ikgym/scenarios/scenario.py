@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import os
 from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
@@ -17,22 +19,50 @@ from ikgym.arms.urdf import open_meshes
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
+from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.bodies import Surroundings
 from ikgym.kernels.kinematics import Chain, stacked
-from ikgym.obstacles import Obstacle
+from ikgym.kernels.rotations import geodesic_angle, quaternion_of
+from ikgym.kernels.simulation import nominal_rows
+from ikgym.machine import check_memory, gib
+from ikgym.obstacles import MOST_OBSTACLES, Obstacle, random_boxes
+from ikgym.obstacles.solids import solids_of
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
-from ikgym.scenarios import checks, durations, files, starts
-from ikgym.scenarios.surroundings import Surrounded
+from ikgym.scenarios import files
+from ikgym.scenarios.preview import Preview, furthest
 from ikgym.tasks import Task
-from ikgym.trajectories import Trajectory, first_joints_of
-from ikgym.validation import LARGEST, FloatArray, Positive, about, frozen_array, shortened
+from ikgym.trajectories import Trajectory, first_joints_of, frames_of
+from ikgym.trajectories.orientations import matrices
+from ikgym.validation import (
+    LARGEST,
+    FloatArray,
+    Positive,
+    about,
+    flag,
+    frozen_array,
+    known_names,
+    read_only,
+    shortened,
+    whole_number,
+)
 
+#: Most steps of an episode, and of a nominal point: a day of work at 1 kHz.
+MOST_STEPS = 100_000_000
+#: Largest cost of an episode: squares of costs stay finite.
+LARGEST_COST = 1e150
+#: Steps of an episode whose trajectory never ends, or is drawn.
+USUAL_STEPS = 1000
+#: Rest after the end of a path, in [s], in an episode without a number of steps.
+REST = 0.25
 # A start given by `options={"q": …}` may be this far from home in each joint, in [rad] or [m].
 START_RANGE = 2.0 * np.pi
+# Positions this many times the length of the arm away are more likely in [mm] than in [m].
+MILLIMETRES = 50.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Scenario(Frozen, Surrounded):
+class Scenario(Frozen):
     """A tracking problem: arm, nominal trajectory, task coordinates, cost and time.
 
     Args:
@@ -94,29 +124,100 @@ class Scenario(Frozen, Surrounded):
         if self.collisions is True or (self.collisions is None and self.obstacles not in ((), [])):
             arm = open_meshes(self.arm)
             self._settle(model=arm if self.model is self.arm else self.model, arm=arm)
-        checks.check_parts(self._fields())
-        n = self.arm.joints
+        self._check_parts()
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
         if self.start is not None:
-            self._settle(start=frozen_array("start", self.start, (n,), at_most=LARGEST))
+            self._settle(start=frozen_array("start", self.start, (self.joints,), at_most=LARGEST))
         elif self.random and not self.starts_nominally:
             raise InvalidInputError(f"Scenario {self.name!r}: a random Cartesian trajectory needs a start.")
         if self.initial_pose is not None:
-            self._settle(
-                initial_pose=frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST)
-            )
-        held = self._held()
+            pose = frozen_array("initial_pose", self.initial_pose, (self.task.size,), at_most=LARGEST)
+            self._settle(initial_pose=pose)
+        held = self.iterations_per_point
+        held = tuple(held) if isinstance(held, (tuple, list)) else (held,)
         if not held:
             raise InvalidInputError("iterations_per_point: expected at least one number, got none.")
-        held = tuple(checks.step_count("iterations_per_point", number_of_steps, n) for number_of_steps in held)
-        self._settle(iterations_per_point=held)
-        steps = durations.default_steps(self.trajectory, self.dt, held) if self.steps is None else self.steps
-        self._settle(steps=checks.step_count("steps", steps, n))
+        self._settle(iterations_per_point=tuple(self._step_count("iterations_per_point", each) for each in held))
+        self._settle(steps=self._step_count("steps", self._default_steps() if self.steps is None else self.steps))
         self.plant.check(self.arm, self.steps)
-        self._settle(obstacles=checks.obstacles(self._fields()))
+        self._check_obstacles()
         if not self.starts_nominally or (self.arm.limited and not self.random):
             self.first_q(self.trajectory)  # raises if the arm cannot be there
-        checks.check_cost(self.name, self.largest_step_cost(), self.steps)
+        most = self.steps * self.largest_step_cost()
+        if not most <= LARGEST_COST:  # nor is it NaN
+            raise InvalidInputError(
+                f"Scenario {self.name!r}: expected a cost of at most {LARGEST_COST:g} for the worst episode, got "
+                f"{most:.3g}; lower the exponents of the cost, the velocity limit or the distances."
+            )
+
+    def _check_parts(self) -> None:
+        """Checks that model, task and trajectory suit the arm."""
+        name, arm, model, task = self.name, self.arm, self.model, self.task
+        if model.joints != arm.joints:
+            got = f"{model.name!r} with {model.joints}"
+            raise InvalidInputError(f"model of scenario {name!r}: expected an Arm with {arm.joints} joints, got {got}.")
+        self.trajectory.check(model)
+        if task.has_orientation and not self.trajectory.has_orientation:
+            raise InvalidInputError(
+                f"Scenario {name!r}: task {task.name!r} needs orientations, the trajectory has none."
+            )
+
+    def _check_obstacles(self) -> None:
+        """Checks obstacles, collisions and proximity against the other parts."""
+        where, obstacles, arm = f"obstacles of scenario {self.name!r}: expected", self.obstacles, self.arm
+        if not isinstance(obstacles, (tuple, list)) or not all(isinstance(each, Obstacle) for each in obstacles):
+            raise InvalidInputError(f"{where} a list of obstacles, got {shortened(obstacles)}.")
+        self._settle(obstacles=tuple(obstacles))
+        if (count := sum(each.count for each in obstacles)) > MOST_OBSTACLES:
+            raise InvalidInputError(f"{where} at most {MOST_OBSTACLES}, got {count}.")
+        names = self.body_names
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise InvalidInputError(
+                f"{where} names that differ from each other and from those of bodies, got {min(twice)!r} twice."
+            )
+        for each in obstacles:
+            known_names("body", each.ignored, arm.bodies.names)
+        if self.draws_obstacles and not (self.random and self.trajectory.joint_bound() is not None):
+            raise InvalidInputError(
+                f"{where} the trajectory of a random joint motion, which drawn boxes keep clear, got a "
+                f"{type(self.trajectory).__name__}."
+            )
+        if self.collisions is not None:
+            flag("collisions", self.collisions)
+        if self.collides:
+            arm.bodies.check_seen(arm.name)
+            if not len(arm.bodies):
+                raise InvalidInputError(
+                    f"collisions of scenario {self.name!r}: expected an arm with bodies, {arm.name!r} has none."
+                )
+        elif self.proximity is not None:
+            raise InvalidInputError(
+                f"proximity of scenario {self.name!r}: expected a scenario with collisions, got one without; they are "
+                "switched on by obstacles, or by collisions = true."
+            )
+
+    def _step_count(self, name: str, value: int) -> int:
+        """A checked number of steps; the message states the memory."""
+        steps = whole_number(name, value, at_least=1)
+        if steps > MOST_STEPS:
+            raise InvalidInputError(
+                f"{name}: expected a whole number of at most {MOST_STEPS}, got {steps}; so many nominal points would "
+                f"take about {gib(self._bytes_of(steps))} of memory."
+            )
+        return steps
+
+    def _bytes_of(self, points: int) -> int:
+        """About how much memory the nominal points of an episode take while they are computed."""
+        # The joint path, the poses as rotations, positions, frames and a copy, and the numbers of the points.
+        return 8 * points * (self.joints + 3 * 12)
+
+    def _default_steps(self) -> int:
+        """Steps for the whole path and a short rest; :data:`USUAL_STEPS` where there is no end."""
+        time, held = duration(self.trajectory), self._held
+        if time is None:
+            return USUAL_STEPS
+        points = math.ceil(time / self.dt - 1e-9) + math.ceil(REST / self.dt)
+        return sum(held[:points]) + max(points - len(held), 0) * held[-1]
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one.
@@ -131,8 +232,8 @@ class Scenario(Frozen, Surrounded):
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)
         arm = changes.get("arm")
-        own_scale = np.array_equal(self.velocity_limit, self.arm.velocity_limit)
-        if own_scale and isinstance(arm, Arm) and np.isfinite(arm.velocity_limit).all():
+        limits_of_arm = np.array_equal(self.velocity_limit, self.arm.velocity_limit)
+        if limits_of_arm and isinstance(arm, Arm) and np.isfinite(arm.velocity_limit).all():
             changes.setdefault("velocity_limit", None)
         return super().replace(**changes)
 
@@ -156,7 +257,7 @@ class Scenario(Frozen, Surrounded):
     @property
     def cut_off(self) -> float:
         """The time in [s] at the end of a path for which the steps do not suffice; 0 where they do."""
-        time = durations.duration(self.trajectory)
+        time = duration(self.trajectory)
         missing = 0.0 if time is None else time - self.dt * float(self.points()[-1])
         return missing if missing > 1e-6 * self.dt else 0.0
 
@@ -269,7 +370,10 @@ class Scenario(Frozen, Surrounded):
         else:
             nominal = trajectory.reach(self.times(int(self.points()[-1]) + 1), self.model)
         distance = self.plant.reach(self.arm, self.joint_bound()) + nominal
-        largest = checks.largest_step_cost(self.task, self.cost, self.velocity_limit, distance)
+        # Parts of two rotations differ by 2 at most; a rotation vector is no longer than π.
+        turned = np.pi if self.task.kind in (task_kernels.POSE, task_kernels.AXIS) else 2.0
+        errors = np.array([distance] * 3 + [turned] * (self.task.error_size - 3))
+        largest = self.cost.largest(errors, self.velocity_limit)
         return largest if self.proximity is None else largest + self.proximity.largest
 
     def start_bound(self) -> FloatArray:
@@ -290,4 +394,249 @@ class Scenario(Frozen, Surrounded):
         """The start of all episodes: the one that is given, or one at the first pose of a Cartesian trajectory."""
         if self.start is not None:
             return self.start
-        return starts.found(self.name, self.arm, self.frames(self.trajectory, 1)[0])
+        return self._find_start(self.frames(self.trajectory, 1)[0])
+
+    def _find_start(self, frame: FloatArray) -> FloatArray:
+        """Joint coordinates within the limits at a frame, near to the home posture if there are some. Shape (n,)."""
+        arm, rotation, position = self.arm, (frame[:9].reshape(3, 3) if len(frame) == 12 else None), frame[-3:]
+        q, converged = arm.inverse(rotation, position)
+        if not converged:
+            distance, angle = distances(arm, q, rotation, position)
+            gap = f"{distance:.3g} m" if rotation is None else f"{distance:.3g} m and {angle:.3g} rad"
+            raise InvalidInputError(
+                f"Scenario {self.name!r}: expected a trajectory that begins where arm {arm.name!r} can be, got one "
+                f"that begins {gap} from the nearest joint coordinates that were found within its limits; "
+                f"{_guess_mistake(arm, rotation, position)}."
+            )
+        return read_only(q)
+
+    @property
+    def random(self) -> bool:
+        """Whether the reset seed chooses the trajectory."""
+        return self.trajectory.random
+
+    def nominal(self, seed: int | None = None, preview: Preview = 0) -> FloatArray:
+        """The nominal task coordinates X^N(0), X^N(1), … of an episode, one row a step.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+            preview: Steps past the end of the episode, as in the environment.
+
+        Returns:
+            Task coordinates. Shape (steps + preview + 1, m).
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        points = self.points(preview)
+        out = np.empty((points[-1] + 1, self.task.size))
+        nominal_rows(self.task.kind, self.frames(self.episode(seed), len(out)), out)
+        return out[points]
+
+    def nominal_joint_path(self, seed: int | None = None, preview: Preview = 0) -> FloatArray | None:
+        """The nominal joint coordinates of an episode, one row a step; None for a Cartesian trajectory.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+            preview: Steps past the end of the episode.
+
+        Returns:
+            Joint coordinates in [rad] or [m]. Shape (steps + preview + 1, n).
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        points = self.points(preview)
+        path = self.episode(seed).joint_path(self.times(int(points[-1]) + 1))
+        return None if path is None else path[points]
+
+    def episode(self, seed: int | None = None) -> Trajectory:
+        """The reference trajectory of an episode.
+
+        Args:
+            seed: The reset seed; needed where the scenario is random.
+
+        Raises:
+            InvalidInputError: The scenario is random and there is no seed.
+        """
+        if self.random and seed is None:
+            raise InvalidInputError(f"Scenario {self.name!r} is random: a seed says which episode is meant.")
+        return self.trajectory.sample(seeding.np_random(seed)[0]) if self.random else self.trajectory
+
+    def points(self, preview: Preview = 0) -> npt.NDArray[np.int64]:
+        """Numbers of the nominal points that are the target after k steps.
+
+        Args:
+            preview: Steps past the end of the episode.
+
+        Returns:
+            Numbers of points. Shape (steps + preview + 1,).
+
+        Raises:
+            InvalidInputError: There is no memory for so many.
+        """
+        last = self.steps + furthest(preview)
+        check_memory(f"The {last + 1} nominal points of an episode", self._bytes_of(last + 1))
+        # Points that are held for longer than the episode are held to its end.
+        *first, usual = (min(held, last + 1) for held in self._held)
+        ends = np.cumsum(first, dtype=np.int64)
+        rest = (last - (int(ends[-1]) if len(ends) else 0)) // usual + 1
+        lengths = np.concatenate([np.array(first, dtype=np.int64), np.full(max(rest, 0), usual)])
+        return np.concatenate([[0], np.repeat(np.arange(1, len(lengths) + 1), lengths)])[: last + 1]
+
+    def counted(self) -> npt.NDArray[np.bool_]:
+        """Whether errors and costs count after k steps: at the last step of each point, and of the episode.
+
+        Returns:
+            Truth values; the start does not count. Shape (steps + 1,).
+        """
+        points = self.points(1)
+        out: npt.NDArray[np.bool_] = points[1:] != points[:-1]
+        out[0], out[-1] = False, True
+        return out
+
+    def frames(self, trajectory: Trajectory, points: int) -> FloatArray:
+        """The nominal frames of one episode, one row a point; see :meth:`Trajectory.frames`.
+
+        Args:
+            trajectory: Trajectory of the episode.
+            points: Number of points.
+
+        Returns:
+            Frames. Shape (points, 12), or (points, 3) where the task has no orientation.
+        """
+        frames = trajectory.frames(self.times(points), self.model)
+        return np.ascontiguousarray(frames if self.task.has_orientation else frames[:, -3:])
+
+    def frames_of(self, episodes: Sequence[Trajectory], points: npt.NDArray[np.int64]) -> FloatArray:
+        """The nominal frames of several episodes, each at points of its own; bit for bit those of :meth:`frames`.
+
+        Args:
+            episodes: Trajectories of the k episodes.
+            points: Numbers of points. Shape (k, p).
+
+        Returns:
+            Frames. Shape (k, p, 12), or (k, p, 3) where the task has no orientation.
+        """
+        frames = frames_of(episodes, points.astype(np.float64) * self.dt, self.model)
+        return frames if self.task.has_orientation else frames[..., -3:]
+
+    def times(self, points: int) -> FloatArray:
+        """Times of the nominal points in [s]. Shape (points,)."""
+        return np.arange(points, dtype=np.float64) * self.dt
+
+    @property
+    def _held(self) -> tuple[int, ...]:
+        return self.iterations_per_point  # type: ignore[return-value]  # as it was checked
+
+    @property
+    def collides(self) -> bool:
+        """Whether an arm that touches something is stopped."""
+        return bool(self.obstacles) if self.collisions is None else self.collisions
+
+    @functools.cached_property
+    def surroundings(self) -> Surroundings:
+        """The obstacles as kernels see them: as they are at the start, and which bodies they are checked against."""
+        boxes, checked = self.arm.bodies.surroundings(self.obstacles)
+        return Surroundings(np.ascontiguousarray(self.obstacle_rows(1)[0]).reshape(boxes.shape), checked)
+
+    @functools.cached_property
+    def obstacles_shown(self) -> bool:
+        """Whether the observation shows the obstacles: where one moves or is drawn."""
+        return self.collides and any(one.motion is not None or one.random for one in self.obstacles)
+
+    def obstacle_rows(self, steps: int) -> FloatArray:
+        """The obstacles after 0, 1, … steps, see :class:`ikgym.kernels.bodies.Surroundings`.
+
+        Args:
+            steps: k, the number of rows.
+
+        Returns:
+            Shape (k, o, 16), or (1, o, 16) where none moves.
+        """
+        return solids_of(self.obstacles, self.times(steps), self.model)
+
+    def obstacle_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The smallest and the largest numbers that obstacles have in any episode. Shapes (o, 16)."""
+        rows = self.obstacle_rows(self.steps + 2)
+        return random_boxes.bounds(self.obstacles, rows.min(axis=0), rows.max(axis=0))
+
+    @property
+    def draws_obstacles(self) -> bool:
+        """Whether obstacles are drawn when an episode begins."""
+        return any(one.random for one in self.obstacles)
+
+    def drawn_obstacles(self, episodes: Sequence[Trajectory], generators: Sequence[np.random.Generator]) -> FloatArray:
+        """The obstacles at the start of several episodes, those among them that are drawn.
+
+        Args:
+            episodes: Trajectories of the k episodes.
+            generators: One an episode, which has drawn its trajectory and its plant; touched only where an obstacle is
+                drawn.
+
+        Returns:
+            Shape (k, o, 16).
+
+        Raises:
+            InvalidInputError: There is no room for an obstacle in an episode.
+        """
+        return random_boxes.drawn_rows(
+            self.arm, self.obstacles, self.obstacle_rows(1)[0], episodes, self._step_times, generators
+        )
+
+    def obstacles_of(self, seed: int | None = None) -> tuple[Obstacle, ...]:
+        """The obstacles of an episode, with the boxes that were drawn.
+
+        Args:
+            seed: The reset seed; needed where an obstacle is drawn.
+
+        Raises:
+            InvalidInputError: There is no seed where one is needed, or no room for an obstacle.
+        """
+        if not self.draws_obstacles:
+            return tuple(self.obstacles)
+        if seed is None:
+            raise InvalidInputError(f"Scenario {self.name!r} draws obstacles: a seed says which episode is meant.")
+        generator = seeding.np_random(seed)[0]
+        episodes = self.trajectory.samples([generator])
+        episode_key(self.plant, generator)  # drawn before them
+        return random_boxes.fixed(self.obstacles, self.drawn_obstacles(episodes, [generator])[0])
+
+    @property
+    def _step_times(self) -> FloatArray:
+        """The times of the nominal points after 0, 1, … steps, in [s]. Shape (steps + 1,)."""
+        return np.asarray(self.points() * self.dt)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies of the arm and of all obstacles, as numbers of pairs count them."""
+        return (*self.arm.bodies.names, *(name for obstacle in self.obstacles for name in obstacle.names))
+
+    def pair_names(self, pair: Sequence[int]) -> tuple[str, str]:
+        """The names of a pair that :meth:`ikgym.Arm.clearance` or an outcome has."""
+        return self.body_names[pair[0]], self.body_names[pair[1]]
+
+
+def duration(trajectory: Trajectory) -> float | None:
+    """The time from rest to rest in [s]; None for a trajectory that never ends, or is drawn."""
+    return None if trajectory.random else getattr(trajectory, "duration", None)
+
+
+def distances(arm: Arm, q: FloatArray, rotation: FloatArray | None, position: FloatArray) -> tuple[float, float]:
+    """Distances of an arm from a pose, in [m] and in [rad]; the angle is 0 without an orientation."""
+    there_rotation, there = arm.forward(q)
+    angle = 0.0 if rotation is None else float(geodesic_angle(rotation, there_rotation))
+    return float(np.linalg.norm(there - position)), angle
+
+
+def _guess_mistake(arm: Arm, rotation: FloatArray | None, position: FloatArray) -> str:
+    """The mistake that most likely leads to a first pose out of reach."""
+    reach, away = arm.reach(np.zeros(arm.joints)), float(np.linalg.norm(position))
+    if away > MILLIMETRES * reach:
+        return f"it is {away:.4g} m away, and the arm {reach:.3g} m long: are positions in [mm]? Expected [m]"
+    if rotation is not None:
+        w, x, y, z = quaternion_of(*rotation)
+        for order, other in {"x, y, z, w": (z, w, x, y), "w, x, y, z": (x, y, z, w)}.items():
+            if arm.inverse(matrices(np.array([other]))[0], position)[1]:
+                return f"with quaternions read as {order} it is in reach: is that their order? Expected w, x, y, z"
+    return "give a start, or another trajectory"

@@ -20,7 +20,7 @@ from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario, load
-from ikgym.scenarios.toml import document
+from ikgym.scenarios.files import document
 from ikgym.trajectories import Helix, PathTrajectory, Quintic, Sinusoid, TimeLaw, Trajectory, paths
 from ikgym.trajectories.orientations import Orientation
 from tests.arms.test_urdf import LIMIT, joint, robot

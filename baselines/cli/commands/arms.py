@@ -14,7 +14,7 @@ from baselines.cli.own_path import ROBOT_OPTIONS, RobotOptions, describe_bodies,
 from baselines.cli.parsing import Rule
 from ikgym import arms, scenarios
 from ikgym.arms import Arm, Tip
-from ikgym.scenarios import toml
+from ikgym.scenarios.files import document
 
 #: Most tips in a table; names alone of the others.
 MOST_TIPS = 8
@@ -129,7 +129,7 @@ def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> s
     table: dict[str, object] = {"urdf": name, "base": given.base, "tip": tip, "tool": given.tool}
     table |= {"packages": given.packages or None, "bodyless": given.bodyless or None, "acceleration_limit": limit}
     head = "In a scenario file:" if stated else "In a scenario file (add acceleration_limit, which no URDF states):"
-    return f"{head}\n\n{toml.document({'arm': table}).strip()}"
+    return f"{head}\n\n{document({'arm': table}).strip()}"
 
 
 main = shell.listed(

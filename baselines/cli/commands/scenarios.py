@@ -11,7 +11,8 @@ from baselines.cli import shell
 from baselines.cli.own_path import describe_bodies
 from ikgym import scenarios
 from ikgym.arms import Arm
-from ikgym.scenarios import Scenario, durations
+from ikgym.scenarios import Scenario
+from ikgym.scenarios.scenario import duration
 
 
 def _scenario_row(name: str) -> tuple[str, ...]:
@@ -74,7 +75,7 @@ def _path(scenario: Scenario) -> dict[str, object]:
     if scenario.random or scenario.trajectory.joint_path(np.zeros(1)) is not None:
         return {}
     out: dict[str, object] = {}
-    if (time := durations.duration(scenario.trajectory)) is not None:
+    if (time := duration(scenario.trajectory)) is not None:
         cut = f": {scenario.cut_off:.3g} s are cut off" if scenario.cut_off else ""
         out["path takes"] = f"{time:.3g} s, the episode {scenario.steps * scenario.dt:.3g} s{cut}"
     return out | {"poses in reach": _reach(scenario)}

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from baselines.recording import Episode, Seeds, add_up
 from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
 from ikgym.scenarios import Scenario
-from ikgym.scenarios.contacts import pair_names
 from ikgym.validation import FloatArray
 
 #: The frame of fixed objects.
@@ -29,7 +28,7 @@ def contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
     step = int(stops[0] if len(stops) else until.argmin())
     return {
         "clearance_min": float(until.min()),
-        "closest_pair": list(pair_names(scenario, episode.pair[step].astype(np.int64).tolist())),
+        "closest_pair": list(scenario.pair_names(episode.pair[step].astype(np.int64).tolist())),
         "closest_step": step + 1,
         "stopped": step + 1 if len(stops) else None,
         "proximity_cost": None if episode.proximity_cost is None else float(add_up(episode.proximity_cost)),
