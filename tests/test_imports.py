@@ -79,7 +79,7 @@ def test_a_command_imports_what_the_command_line_names(loaded):
     others = ("agents", "viewer", "training", "papers", "tuning", "solvers.receding_horizon", "solvers.adaptive")
     assert [name for name in modules if name.startswith(tuple(f"baselines.{one}" for one in others))] == []
     solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}
-    shared = {"resolved_rate", "linear_algebra", "near_bodies", "surroundings"}
+    shared = {"resolved_rate", "near_bodies", "surroundings"}
     assert {"quadratic_program"} <= solvers <= {"quadratic_program", *shared}
     assert {name for name in modules if name.startswith("baselines.cli.")} == {
         "baselines.cli.commands",

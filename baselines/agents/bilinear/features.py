@@ -19,11 +19,11 @@ import math
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import damped_step
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import within
+from ikgym.kernels.linear_algebra import damped_step
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
 #: Added to the speed of the reference, in [m/s], [rad/s] or [1/s], since a reference at rest has no scale.

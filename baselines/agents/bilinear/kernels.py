@@ -18,8 +18,8 @@ import numpy as np
 
 from baselines.agents.bilinear.features import feature_rows, mean_twists, metric_rows, seen_jacobian
 from baselines.agents.network import forward_rows
-from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.kernels.jit import inlined, inner, kernel
+from ikgym.kernels.linear_algebra import damped_gram, ldl, ldl_scaled_inverse
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
 #: Bound of the logarithms.

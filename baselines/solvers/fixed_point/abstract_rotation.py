@@ -15,13 +15,13 @@ from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
-from baselines.solvers.linear_algebra import dot, transposed_product
 from baselines.status import Status
 from ikgym import arms, tasks
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
+from ikgym.kernels.linear_algebra import dot, transposed_product
 from ikgym.validation import Bounds, FloatArray, as_given, one_of, per_joint
 
 #: Vectors that 𝒩 rotates, with their numbers in the kernel.

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import dot
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from ikgym.kernels.linear_algebra import dot
 from ikgym.validation import FloatArray
 
 #: Transformations of f(q) - x before it is added to q, with their numbers in the kernel.

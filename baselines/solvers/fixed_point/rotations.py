@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from baselines.solvers.linear_algebra import dot
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.linear_algebra import dot
 
 # A unit vector this close to another one, or to its opposite, spans no plane with it: the rest is rounding.
 PARALLEL = 1e-15

@@ -10,8 +10,8 @@ apart, which is the shortcut (38).
 
 from __future__ import annotations
 
-from baselines.solvers.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
 from ikgym.kernels.jit import inlined, inner
+from ikgym.kernels.linear_algebra import damped_gram, ldl, ldl_scaled_inverse, ldl_solve, transposed_product
 
 
 @inner

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import orthogonal_columns
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import expanded, inner, kernel
+from ikgym.kernels.linear_algebra import orthogonal_columns
 from ikgym.validation import FloatArray, float_array, frozen_array, known_name
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2

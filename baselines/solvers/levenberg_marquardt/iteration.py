@@ -14,11 +14,11 @@ from baselines.solvers.levenberg_marquardt.damping import (
     damping_next,
     damping_now,
 )
-from baselines.solvers.linear_algebra import damped_step, dot, pseudoinverse_rows
 from baselines.status import Status
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from ikgym.kernels.linear_algebra import damped_step, dot, pseudoinverse_rows
 from ikgym.validation import FloatArray
 
 CONVERGED, APPLIED, LIMIT = int(Status.CONVERGED), int(Status.APPLIED), int(Status.ITERATION_LIMIT)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.policy_kernels import BRAKING
-from baselines.solvers.linear_algebra import dot, inverse_of_factor
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work
 from baselines.solvers.quadratic_program.program import held_back, row_program
 from baselines.solvers.quadratic_program.row_minimum import row_minimum
@@ -14,7 +13,7 @@ from baselines.solvers.resolved_rate.base import APPLIED, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.limits import FASTEST, LOWER, UPPER
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.linear_algebra import cholesky, dot, inverse_of_factor
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # Share of the way to the clearance that a step may take, the distance for joint motions in the null space, in

@@ -10,7 +10,6 @@ import numpy as np
 
 from baselines.policy import Memory
 from baselines.policy.fields import derived
-from baselines.solvers.linear_algebra import dot
 from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope
@@ -32,6 +31,7 @@ from ikgym.kernels import tasks
 from ikgym.kernels.jit import inlined, inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import CHANGE, FASTEST
+from ikgym.kernels.linear_algebra import dot
 from ikgym.validation import Bounds, FloatArray, read_only
 
 LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)

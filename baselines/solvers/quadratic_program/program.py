@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import transposed_product
 from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
 from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve, transposed_product
 from ikgym.kernels.tasks import AXIS, POSE
 
 # Weight of the length of a task shift against its direction, and of joint motion against that.

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import dot
 from ikgym.kernels.jit import inlined, inner, uncounted
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.linear_algebra import cholesky, dot
 
 # A normal whose part off the active ones is below this share of it is a combination of them; a constraint that is
 # missed by less, in units of its own normal and relative to 1 or its bound, holds.

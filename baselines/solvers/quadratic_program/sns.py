@@ -9,14 +9,13 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.solvers.linear_algebra import inverted, singular_values
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.limits import CHANGE, FASTEST
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.linear_algebra import cholesky, singular_values, solve_by_singular_values
 from ikgym.validation import Bounds, FloatArray, read_only
 
 SATURATED = int(Status.SATURATED)
@@ -50,8 +49,8 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
         full = rank if made == 1 else full
         if rank < full:
             break
-        inverted(columns, left, squares, square, smallest, shift, along)
-        inverted(columns, left, squares, square, smallest, rest, base)
+        solve_by_singular_values(columns, left, squares, square, smallest, shift, along)
+        solve_by_singular_values(columns, left, squares, square, smallest, rest, base)
         base += fixed
         scale, critical = scaling(along, base, lower, upper)
         if scale > best:

@@ -7,10 +7,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import damped_gram, transposed_product
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
 from ikgym.kernels.jit import inner, kernel
-from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
+from ikgym.kernels.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
 from ikgym.validation import Bounds
 
 

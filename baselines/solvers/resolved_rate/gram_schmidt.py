@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import dot
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,
@@ -17,6 +16,7 @@ from baselines.solvers.resolved_rate.base import (
     task_motion,
 )
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.linear_algebra import dot
 from ikgym.validation import Bounds
 
 

@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,
@@ -19,6 +18,7 @@ from baselines.solvers.resolved_rate.base import (
     task_motion,
 )
 from ikgym.kernels.jit import kernel
+from ikgym.kernels.linear_algebra import pseudoinverse_rows
 from ikgym.validation import Bounds, FloatArray, read_only
 
 

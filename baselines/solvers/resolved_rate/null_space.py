@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from baselines.policy.fields import derived
-from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, full_rank, say_deficient, task_motion
 from baselines.solvers.resolved_rate.dls import damped_rows
@@ -18,6 +17,7 @@ from ikgym.arms import Arm
 from ikgym.arms.limits import middle
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import inner, kernel
+from ikgym.kernels.linear_algebra import pseudoinverse_rows
 from ikgym.validation import Bounds, FloatArray, as_given, one_of, per_joint, read_only
 
 OBJECTIVES = ("posture", "joint_centring")

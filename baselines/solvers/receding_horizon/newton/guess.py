@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from baselines.solvers.linear_algebra import damped_step, dot
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner, kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
 from ikgym.kernels.limits import FASTEST, LOWER, UPPER
+from ikgym.kernels.linear_algebra import damped_step, dot
 
 # Damped steps that bring the arm from one knot to the next.
 CORRECTIONS = 2

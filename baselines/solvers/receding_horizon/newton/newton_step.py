@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from baselines.solvers.linear_algebra import inverse_of_factor
 from ikgym.kernels.jit import inlined, uncounted
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.linear_algebra import cholesky, inverse_of_factor
 
 
 @uncounted

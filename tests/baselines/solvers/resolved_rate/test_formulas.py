@@ -6,13 +6,13 @@ import pytest
 import baselines
 import ikgym
 from baselines.solvers.arm_size import error_weights
-from baselines.solvers.linear_algebra import pseudoinverse_rows
 from baselines.solvers.resolved_rate.base import APPLIED, DEFICIENT
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares, damped_rows
 from baselines.solvers.resolved_rate.gram_schmidt import GramSchmidt, orthonormal_rows
 from baselines.solvers.resolved_rate.jacobian_transpose import JacobianTranspose, transpose_rows
 from baselines.solvers.resolved_rate.null_space import aimed_rows, objective_rows
 from baselines.status import Status
+from ikgym.kernels.linear_algebra import pseudoinverse_rows
 from tests.baselines.solvers.adaptive.arms import observed
 from tests.baselines.solvers.quadratic_program.paths import circle
 from tests.limited import limited

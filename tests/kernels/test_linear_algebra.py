@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines.solvers.linear_algebra import ldl, orthogonal_columns
-from ikgym.kernels.linear_algebra import cholesky
+from ikgym.kernels.linear_algebra import cholesky, ldl, orthogonal_columns
 
 
 @pytest.mark.parametrize("matrix", [[[0.0]], [[1.0, 1.0], [1.0, 1.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
