@@ -29,8 +29,10 @@ LEAST_VARIANCE = 1e-18
 STRIDES = (4.0, 2.0, 1.0, 0.5, 0.25, 0.0625, 0.015625)
 #: Doubt of a delay, in steps, up to which it is known.
 KNOWN = 1.0
-#: By how many steps the slowest joint may be later than the model is ahead, and earlier.
-LATER, EARLIER = 0.25, 1.25
+#: Steps over which white noise of q is distinguished from errors of the drives, and samples of the running variances.
+SPAN, SAMPLES = 32, 500.0
+#: By how many steps the slowest joint may be later than the model is ahead, and earlier; together above 1.
+LATER, EARLIER = 0.25, 0.9
 # Sums over time: of squares, and of products with the residual of the next lag, of the next delay, and of both, which
 # has two.
 ALONE, NEXT_LAG, NEXT_DELAY, CROSSED = range(4)
@@ -78,6 +80,9 @@ class PredictedMemory(NamedTuple):
         arm_qdot: Its joint velocities in [rad/s] or [m/s]. Shape (B, A, n).
         offset: Measured task coordinates minus those that the model has at the same time, filtered. Shape (B, m).
         fastest: The largest velocity of that arm in the last second or so, in [rad/s] or [m/s]. Shape (B, n).
+        off: How far the arm was from where the simulated drives should have brought it in the last steps, in [rad] or
+            [m]. Shape (B, n, SPAN).
+        spread: Running sums of the squared changes of that over one step and over SPAN steps. Shape (B, n, 2).
     """
 
     begun: BoolArray
@@ -96,6 +101,8 @@ class PredictedMemory(NamedTuple):
     arm_qdot: FloatArray
     offset: FloatArray
     fastest: FloatArray
+    off: FloatArray
+    spread: FloatArray
 
 
 def longest_lead(delay: FloatArray) -> int:
@@ -130,6 +137,8 @@ def start_memory(rows: int, coordinates: int, hypotheses: Hypotheses, oldest: in
         np.zeros((rows, delays + 1, n)),
         np.zeros((rows, coordinates)),
         np.zeros((rows, n)),
+        np.zeros((rows, n, SPAN)),
+        np.zeros((rows, n, 2)),
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.solvers.adaptive.drives import TOTAL, mixture
+from baselines.solvers.adaptive.drives import SAMPLES, SPAN, TOTAL, mixture
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from ikgym.kernels.jit import inlined, kernel
 from ikgym.validation import LARGEST, FloatArray
@@ -52,6 +52,30 @@ def gain_of(least, doubt):
     return max(least, STABLE * 2.0 * math.sin(math.pi / (2.0 * (2.0 * steps + 1.0))))
 
 
+@inlined
+def kalman_gain(off, step, past, spread):
+    """Gain that corrects a measured error best: the Kalman gain of a random walk observed in white noise.
+
+    Over s steps the measured error changes with the variance s w + 2 v, where w is that of a step of the walk (errors
+    of the simulated drives) and v that of the noise. Running sums for one step and for SPAN steps give both.
+
+    Args:
+        off: The error in [rad] or [m].
+        step: k, the number of the measurement.
+        past: The last errors, that of step k at k modulo SPAN, changed in place. Shape (SPAN,).
+        spread: Running sums of the squared changes over one step and over SPAN steps, changed in place. Shape (2,).
+    """
+    here = step % SPAN
+    spread[0] += (off - past[here - 1]) ** 2 - spread[0] / SAMPLES
+    spread[1] += (off - past[here]) ** 2 - spread[1] / SAMPLES
+    past[here] = off
+    walk = (spread[1] - spread[0]) / (SPAN - 1)
+    noise = 0.5 * (spread[0] - walk)
+    if noise <= 0.0:
+        return 1.0
+    return 2.0 / (1.0 + math.sqrt(1.0 + 4.0 * noise / walk)) if walk > 0.0 else 0.0
+
+
 @kernel
 def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
@@ -81,8 +105,8 @@ def follow_rows(off, lags, servo, memory, qdot):
     A joint that is less late than the slowest one follows where that arm was some steps ago. A command is the velocity
     wanted and a share of the error, through the inverse of the lag. Where accelerations are limited, large errors are
     corrected no faster than the arm can stop, at a raised gain also through its lag: a share of them would overshoot
-    ever more. A command is at most so many times faster than the wanted velocity of the last second, or slow: the
-    inverse of a lag makes peaks of steps, and a wrong one of errors.
+    ever more. The gain is raised up to :func:`kalman_gain`. A command is at most ``overdrive`` times as fast as the
+    wanted velocity of the last second, or slow: the inverse of a lag turns steps, and a wrong one errors, into peaks.
 
     Args:
         off: How far the arm is from where the simulated drives should have brought it, in [rad] or [m]. Shape (B, n).
@@ -92,8 +116,8 @@ def follow_rows(off, lags, servo, memory, qdot):
         qdot: Receives the commands in [rad/s] or [m/s]. Shape (B, n).
     """
     gain, dt, unit, largest, change, overdrive = servo
-    velocity, path, fastest = memory[2], memory[3], memory[15]
-    delay, lag, doubt, sent, lead, arm_q, arm_qdot = memory[7:14]
+    velocity, path, fastest, past, spread = memory[2], memory[3], memory[15], memory[16], memory[17]
+    samples, delay, lag, doubt, sent, lead, arm_q, arm_qdot = memory[6:14]
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
             speeds, places = velocity[row, j], path[row, j]
@@ -108,7 +132,9 @@ def follow_rows(off, lags, servo, memory, qdot):
             size = abs(error) / dt
             accelerated = min(change[j], LARGEST) * size  # 0 without an error, also where there is no limit
             slow = min(gain * size, math.sqrt(SHARE * accelerated))
-            fast = min(gain_of(gain, doubt[row, j, TOTAL]) * size, math.sqrt(min(SHARE, 0.5 * (a + b)) * accelerated))
+            useful = kalman_gain(off[row, j], samples[row], past[row, j], spread[row, j])
+            raised = min(gain_of(gain, doubt[row, j, TOTAL]), useful)
+            fast = min(raised * size, math.sqrt(min(SHARE, 0.5 * (a + b)) * accelerated))
             target = wanted + math.copysign(max(slow, fast), error)
             free = (1.0 - share - a) * speeds[low] + (share - b) * speeds[high]
             command, last = (target - free) / (a + b), sent[row, j]

@@ -49,7 +49,8 @@ class Predicted(NamedWrapper):
     acceleration, and a small share of the error that is predicted for the time when it takes effect: where the
     simulated drive will be then, corrected by how far the measured arm is from where the simulated one should be now.
     With a wrong delay that feedback alone has the delay in its loop, and its gain is low for that. It rises as evidence
-    rules out other delays and lags, up to what is stable if a delay changes by two steps.
+    rules out other delays and lags, up to what is stable if a delay changes by two steps, and up to the Kalman gain
+    where white noise of q outweighs the errors of the simulated drives.
 
     Unknown drives are identified joint by joint from measured joint coordinates and the policy's own commands, see
     :mod:`baselines.solvers.adaptive.drives`; ``delay`` and ``bandwidth`` are the guess that holds until there is

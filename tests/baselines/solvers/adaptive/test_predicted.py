@@ -98,6 +98,21 @@ def test_old_poses_are_held_against_the_joint_coordinates_of_their_time(ideal):
     assert costs[1] < 1.5 * ideal
 
 
+@pytest.mark.parametrize(("noise", "rougher", "worse"), [(1e-5, 1.05, 1.15), (1e-4, 1.3, 5.2)])
+def test_noise_of_the_encoders_is_not_amplified(noise, rougher, worse):
+    """On late drives, once they are identified; accelerations and errors relative to those without noise."""
+    scenario = ikgym.scenarios.get("panda-ideal").replace(dt=4e-3, steps=375)
+    policy, found = baselines.make("predicted", scenario), []
+    for deviation in (0.0, noise):
+        on = scenario.replace(plant=ikgym.Plant(command_delay=3, bandwidth=8.0, q_noise=deviation))
+        episode = rollouts(on, policy, [SEED])[0]
+        acceleration = np.diff(episode.q, 2, axis=0)[125:] / scenario.dt**2
+        found.append([np.sqrt(np.mean(x**2)) for x in (acceleration, episode.position_error[125:])])
+    ratio = np.divide(found[1], found[0])
+    assert ratio[0] < rougher
+    assert ratio[1] < worse
+
+
 def test_an_arm_at_rest_says_nothing_of_its_drives():
     guess = Hypotheses(True, 7, np.array([[1.0, 4.0, 8.0]] * 2), np.full(2, 5.0), np.full(2, 6.0))
     memory, rng = start_memory(1, 3, guess, 0), np.random.default_rng(0)
