@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ikgym.kernels.random_numbers import CUT
+from ikgym.plant.response import deflection
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import Preview, offsets
 from ikgym.validation import FloatArray
@@ -28,7 +29,8 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
     """
     ahead = offsets(preview)
     q = SLACK * scenario.joint_bound()
-    plant, noise = scenario.plant, CUT * np.asarray(scenario.plant.q_noise)
+    plant = scenario.plant
+    noise = CUT * np.asarray(plant.q_noise) + deflection(plant, scenario.velocity_limit, scenario.dt)
     pose = _coordinate_bound(scenario, plant.reach(scenario.arm, q) + CUT * float(np.max(plant.pose_noise)))
     if scenario.initial_pose is not None:
         pose = np.maximum(pose, np.abs(scenario.initial_pose))

@@ -16,6 +16,15 @@ from ikgym.validation import LARGEST, frozen_array, number, shortened, whole_num
 PerJoint = float | tuple[float, ...]
 #: A number, or a range (low, high) that episodes draw from.
 Drawn = float | tuple[float, float]
+#: Coefficients of a drive of low order: of the last velocities, and of the last commands.
+VELOCITIES, COMMANDS = 3, 4
+#: Largest modulus of the poles of a drive: it forgets a velocity within 45,000 steps.
+LARGEST_POLE = 0.9995
+
+
+def is_range(value: Any) -> bool:
+    """Whether a field with one number, a range or one number a joint is a range; for two joints a pair is one, too."""
+    return isinstance(value, (tuple, list, np.ndarray)) and len(value) == 2
 
 
 def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
@@ -36,14 +45,19 @@ def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
     return float(array) if array.ndim == 0 else tuple(array.tolist())
 
 
-def frequency(name: str, value: Any) -> Drawn:
-    """A frequency above 0, which may be infinite, or a range of finite ones.
+def frequency(name: str, value: Any) -> Drawn | PerJoint:
+    """A frequency above 0, which may be infinite, or one a joint, or a range of finite ones.
 
     Raises:
-        InvalidInputError: It is neither, or the range is the wrong way round.
+        InvalidInputError: It is none of these, or the range is the wrong way round.
     """
     if isinstance(value, float) and value == math.inf:
         return math.inf
+    if isinstance(value, (tuple, list, np.ndarray)) and not is_range(value):
+        return tuple(
+            math.inf if isinstance(one, float) and one == math.inf else number(name, one, above=0.0, at_most=LARGEST)
+            for one in value
+        )
     return _drawn(name, value, "numbers above 0", functools.partial(number, above=0.0, at_most=LARGEST))
 
 
@@ -64,6 +78,66 @@ def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
     """
     drawn: Any = _drawn(name, value, "whole numbers", functools.partial(whole_number, at_least=at_least))
     return drawn  # type: ignore[no-any-return]  # whole numbers come as such
+
+
+def delay(name: str, value: Any) -> PerJoint | tuple[int, int]:
+    """A number of steps, fractions included, or one a joint, or a range of whole numbers.
+
+    Raises:
+        InvalidInputError: It is none of these, or the range is the wrong way round.
+    """
+    if is_range(value):
+        return steps(name, value)
+    found = joint_numbers(name, value)
+    return int(found) if isinstance(found, float) and found.is_integer() else found
+
+
+def resonances(name: str, value: Any) -> PerJoint:
+    """A frequency above 0 in [Hz], inf for none, or one a joint, however many joints there are.
+
+    Raises:
+        InvalidInputError: It is none.
+    """
+    array = np.array(value, dtype=object)
+    found = [frequency(name, one) for one in array.ravel().tolist()]
+    return tuple(found) if array.ndim else found[0]  # type: ignore[arg-type]  # numbers alone
+
+
+def damping(name: str, value: Any) -> PerJoint:
+    """A damping ratio above 0 and below 1, or one a joint.
+
+    Raises:
+        InvalidInputError: It is none.
+    """
+    found = joint_numbers(name, value)
+    if np.min(found) <= 0.0 or np.max(found) >= 1.0:
+        raise InvalidInputError(f"{name}: expected numbers above 0 and below 1, got {shortened(value)}.")
+    return found
+
+
+def coefficients(name: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    """Coefficients of drives of low order: those of one drive for all joints, or one row a joint; () for none.
+
+    Raises:
+        InvalidInputError: A row has another length, or its drive is not stable.
+    """
+    width = VELOCITIES + COMMANDS
+    array = frozen_array(name, value, at_most=LARGEST)
+    if array.size == 0:
+        return ()
+    if array.ndim not in (1, 2) or array.shape[-1] != width:
+        raise InvalidInputError(
+            f"{name}: expected {VELOCITIES} coefficients of velocities and {COMMANDS} of commands, or such a row a "
+            f"joint, got shape {array.shape}."
+        )
+    rows = np.atleast_2d(array)
+    for j, row in enumerate(rows):
+        if (pole := np.abs(np.roots([1.0, *-row[:VELOCITIES]])).max(initial=0.0)) > LARGEST_POLE:
+            raise InvalidInputError(
+                f"{name}: expected stable drives, whose poles are within {LARGEST_POLE}; that of joint {j + 1} has one "
+                f"of modulus {pole:.6g}."
+            )
+    return tuple(tuple(row) for row in rows.tolist())
 
 
 def shares(name: str, value: Any) -> tuple[float, float]:

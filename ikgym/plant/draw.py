@@ -12,7 +12,7 @@ from numpy.random import PCG64
 
 from ikgym.arms import Arm
 from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
-from ikgym.plant.checks import PerJoint
+from ikgym.plant.checks import PerJoint, is_range
 from ikgym.plant.contact import turn_bodies
 from ikgym.plant.plant import WHOLE, Plant
 from ikgym.plant.severity import scaled
@@ -29,8 +29,8 @@ class DrawnPlant:
         arm: The arm that moves before the payload is taken up, with the limits of the arm in the data sheet.
         loaded_arm: The arm that moves afterwards; the same where there is no payload.
         payload_step: Steps made when the payload is taken up.
-        bandwidth: Of the velocity loops in [Hz], inf for none.
-        command_delay: Steps after which a command reaches the drive.
+        bandwidth: Of the velocity loops in [Hz], inf for none. A number, or one a joint.
+        command_delay: Steps after which a command reaches the drive. A number, or one a joint.
         payload: Shift of the joints' zeros by the payload, in [rad] or [m].
         context: All that was drawn from a range, see :attr:`Plant.context`: -1 at its lower end, 1 at its upper end.
             Shape (c,).
@@ -39,8 +39,8 @@ class DrawnPlant:
     arm: Arm
     loaded_arm: Arm
     payload_step: int
-    bandwidth: float
-    command_delay: int
+    bandwidth: PerJoint
+    command_delay: PerJoint
     payload: PerJoint
     context: FloatArray
 
@@ -68,7 +68,7 @@ class Draws:
             plant.link,
             plant.axis,
         )
-        low, high = np.array([np.broadcast_to(getattr(plant, name), 2) for name in Numbers._fields], dtype=np.float64).T
+        low, high = np.array([plant.ends(name) for name in Numbers._fields], dtype=np.float64).T
         whole = np.array([name in WHOLE for name in Numbers._fields])
         streams = np.array(RANGE_STREAMS, dtype=np.uint64)
         self._ranges = Ranges(low.copy(), high.copy(), whole, streams, *plant.from_middle)
@@ -116,7 +116,7 @@ class Draws:
         """The plant that a key draws."""
         plant = self._plant
         if not (plant.other_arm or plant.context or np.any(plant.payload)):  # nothing to draw, and no kernel to compile
-            drives = float(np.max(plant.bandwidth)), plant.longest_command_delay, plant.payload
+            drives = _known(plant.bandwidth, np.inf), _known(plant.command_delay, 0), plant.payload
             return DrawnPlant(self._arm, self._arm, plant.payload_step, *drives, context=np.empty(0))
         keys, out = np.array([key], dtype=np.uint64), self.blank(1)
         numbers, context = self.numbers(keys)
@@ -125,13 +125,21 @@ class Draws:
         self.bodies(keys, np.zeros(1, dtype=np.int64), numbers, out.axes, (ends[0], ends[1]))
         before, after = (self._made(ends[:, 0, loaded], *(part[0, loaded] for part in out)) for loaded in range(2))
         loaded = after if np.any(plant.payload) else before
-        bandwidth, delay, load = float(numbers.bandwidth[0]), int(numbers.command_delay[0]), float(numbers.load[0])
+        bandwidth = _known(plant.bandwidth, float(numbers.bandwidth[0]))
+        delay, load = _known(plant.command_delay, int(numbers.command_delay[0])), float(numbers.load[0])
         payload = scaled(plant.payload, load)
         return DrawnPlant(before, loaded, plant.payload_step, bandwidth, delay, payload, context[0])
 
     def _made(self, ends: FloatArray, *chain: FloatArray) -> Arm:
         bodies = self._arm.bodies.replace(starts=ends[0], ends=ends[1])
         return self._arm.replace(**dict(zip(Arms._fields, chain, strict=True)), bodies=bodies)
+
+
+def _known(value: Any, drawn: float) -> PerJoint:
+    """The value of a field, or what was drawn where that is a range."""
+    if not is_range(value):
+        return value  # type: ignore[no-any-return]  # a field of a plant, which is checked
+    return drawn if value[0] < value[1] else float(value[0])
 
 
 def episode_key(plant: Plant, generator: np.random.Generator) -> int:

@@ -20,7 +20,7 @@ from ikgym.plant.checks import Drawn, PerJoint
 from ikgym.validation import LARGEST, FloatArray, number, per_joint, shortened, whole_number
 
 #: Fields with one number for all joints, or one a joint; and those of them that may be negative.
-JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise")
+JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise", "gain")
 SIGNED = ("payload", "bias")
 #: Fields with one number of at least 0.
 SCALARS = ("link", "axis")
@@ -42,9 +42,11 @@ class Plant(Frozen):
     `scenario.arm`; solvers still use `scenario.model`. Unless the scenario gives a start, an episode begins at the
     posture in which the moving arm has the pose that the arm of the data sheet would begin with.
 
-    *Drives.* Order within a step: delay of the command, velocity limit, acceleration limit, lag, bias and noise,
-    backlash, stop. The backlash lies between drive and joint: the drive turns within it before the joint follows. It
-    begins in the middle. Encoders and stops are on the side of the joint.
+    *Drives.* Order within a step: delay of the command, velocity limit, acceleration limit, lag, drive of low order,
+    gain, bias and noise, backlash, resonance, stop. The backlash lies between drive and joint: the drive turns within
+    it before the joint follows. It begins in the middle. Encoders and stops are on the side of the joint. A resonance
+    lies behind the backlash: a spring and a damper between encoder and link, which swings freely within a step. Stops
+    are on the side of the link. An arm of two joints can have no bandwidths or delays by joint: a pair is a range.
 
     *Sensors.* The first measurement is made at rest before the episode: it is there from the start, and never missing.
     A camera that measures every E-th step does so at the steps 0, E, 2 E, …; the newest measurement that has arrived is
@@ -66,8 +68,15 @@ class Plant(Frozen):
         calibration: Factor of `zero`, `link` and `axis`. A number, or a range.
         load: Factor of `payload`. A number, or a range.
         bandwidth: Bandwidth f of a first-order velocity loop, in [Hz]: a step closes the share 1 − exp(−2π f Δt) of the
-            gap to the commanded velocity. A number, inf for none, or a range.
-        command_delay: Steps after which a command reaches the drive, which stands still before. A number, or a range.
+            gap to the commanded velocity. A number, inf for none, one a joint, or a range.
+        command_delay: Steps after which a command reaches the drive, which stands still before. A number or one a
+            joint, of which fractions interpolate between two commands; or a range of whole numbers.
+        drive: A drive of low order: v(k) = a₁ v(k-1) + a₂ v(k-2) + a₃ v(k-3) + b₀ u(k) + … + b₃ u(k-3) is the velocity
+            in the step k, u the command as it leaves the lag. The numbers (a₁, a₂, a₃, b₀, b₁, b₂, b₃), or such a row a
+            joint; they belong to one Δt. None by default.
+        gain: Factor of the velocity. A number, or one a joint.
+        resonance: Frequency of the spring between encoder and link, in [Hz]. A number, inf for none, or one a joint.
+        resonance_damping: Its damping ratio, above 0 and below 1. A number, or one a joint.
         backlash: Width of the backlash in [rad] or [m]. A number, or one a joint.
         bias: Constant part of the joint velocity, in [rad/s] or [m/s]. A number, or one a joint.
         noise: Bound of a uniform random part of the joint velocity, drawn anew at each step, in [rad/s] or [m/s]. A
@@ -97,8 +106,12 @@ class Plant(Frozen):
     arms: Sequence[Arm] = ()
     calibration: Drawn = 1.0
     load: Drawn = 1.0
-    bandwidth: Drawn = math.inf
-    command_delay: int | tuple[int, int] = 0
+    bandwidth: Drawn | PerJoint = math.inf
+    command_delay: PerJoint | tuple[int, int] = 0
+    drive: tuple[tuple[float, ...], ...] | tuple[float, ...] = ()
+    gain: PerJoint = 1.0
+    resonance: PerJoint = math.inf
+    resonance_damping: PerJoint = 0.05
     backlash: PerJoint = 0.0
     bias: PerJoint = 0.0
     noise: PerJoint = 0.0
@@ -118,12 +131,17 @@ class Plant(Frozen):
             **{name: checks.numbers(name, getattr(self, name)) for name in DRAWN},
             **{name: whole_number(name, getattr(self, name), at_least=0) for name in ("payload_step", *DELAYS)},
             "bandwidth": checks.frequency("bandwidth", self.bandwidth),
-            "command_delay": checks.steps("command_delay", self.command_delay),
+            "command_delay": checks.delay("command_delay", self.command_delay),
+            "drive": checks.coefficients("drive", self.drive),
+            "resonance": checks.resonances("resonance", self.resonance),
+            "resonance_damping": checks.damping("resonance_damping", self.resonance_damping),
             "pose_every": checks.steps("pose_every", self.pose_every, at_least=1),
             "pose_missing": checks.share("pose_missing", self.pose_missing),
             "from_middle": checks.shares("from_middle", self.from_middle),
             "arms": _arms(self.arms),
         }
+        if not np.min(settled["gain"]) > 0.0:
+            raise InvalidInputError(f"gain: expected numbers above 0, got {shortened(self.gain)}.")
         for name, value in settled.items():
             object.__setattr__(self, name, value)
 
@@ -142,14 +160,15 @@ class Plant(Frozen):
         Args:
             knowledge: Factor of deviations, noises and the share of lost measurements, and, rounded to whole steps, of
                 the delays of sensors and of the steps from one measurement to the next.
-            drives: Factor of the time constants, delays, backlash, bias and noise of drives; by default the same.
+            drives: Factor of the time constants, delays, backlash, bias and noise of drives, of the period of their
+                resonances and of the difference of gains from 1; by default the same.
 
         Raises:
-            InvalidInputError: A severity is below 0 or too large, or the plant has arms of its own, which cannot be
-                scaled.
+            InvalidInputError: A severity is below 0 or too large, or the plant has arms or drives of low order, which
+                cannot be scaled.
         """
-        if self.arms:
-            raise InvalidInputError(f"scaled: expected a plant without arms of its own, got {self}.")
+        if self.arms or self.drive:
+            raise InvalidInputError(f"scaled: expected a plant without arms or drives of low order, got {self}.")
         known = number("knowledge", knowledge, at_least=0.0, at_most=LARGEST)
         driven = known if drives is None else number("drives", drives, at_least=0.0, at_most=LARGEST)
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -165,8 +184,12 @@ class Plant(Frozen):
         Raises:
             InvalidInputError: Numbers of joints differ, or a delay is longer than the episode.
         """
-        for name in JOINT_WISE:
-            per_joint(name, getattr(self, name), arm.joints)
+        by_joint = [name for name in ("bandwidth", "command_delay") if not checks.is_range(getattr(self, name))]
+        for name in (*JOINT_WISE, "resonance", "resonance_damping", *by_joint):
+            value = np.array(getattr(self, name))
+            per_joint(name, np.where(np.isinf(value), 1.0, value), arm.joints)
+        if len(self.drive) > 1 and len(self.drive) != arm.joints:
+            raise InvalidInputError(f"drive: expected 1 row or {arm.joints}, one a joint, got {len(self.drive)}.")
         for other in self.arms:
             if other.prismatic != arm.prismatic:
                 raise InvalidInputError(
@@ -194,10 +217,10 @@ class Plant(Frozen):
     @functools.cached_property
     def ideal(self) -> bool:
         """Whether all effects are off."""
-        driven = self.bandwidth != math.inf or self.longest_command_delay > 0
-        return not (
-            self.arms or driven or self.late or self._on(*JOINT_WISE, *SCALARS, "pose_noise", "pose_rotation_noise")
-        )
+        swings = np.min(self.bandwidth) < math.inf or np.min(self.resonance) < math.inf
+        driven = swings or bool(self.drive) or self.longest_command_delay > 0 or np.any(np.not_equal(self.gain, 1.0))
+        others = *(name for name in JOINT_WISE if name != "gain"), *SCALARS, "pose_noise", "pose_rotation_noise"
+        return not (self.arms or driven or self.late or self._on(*others))
 
     @property
     def poses_underway(self) -> int:
@@ -222,8 +245,13 @@ class Plant(Frozen):
     @functools.cached_property
     def context(self) -> tuple[str, ...]:
         """The fields that are ranges, from which episodes draw."""
-        ends = {name: np.broadcast_to(getattr(self, name), 2) for name in Numbers._fields}
+        ends = {name: self.ends(name) for name in Numbers._fields}
         return tuple(name for name, (low, high) in ends.items() if low < high)
+
+    def ends(self, name: str) -> tuple[float, float]:
+        """Both ends of a field that may be a range; where it is none, its largest number twice."""
+        value = getattr(self, name)
+        return tuple(value) if checks.is_range(value) else (np.max(value), np.max(value))
 
     @property
     def random(self) -> bool:
@@ -237,8 +265,8 @@ class Plant(Frozen):
 
     @property
     def longest_command_delay(self) -> int:
-        """The most steps after which a command reaches the drive."""
-        return int(np.max(self.command_delay))
+        """The most steps after which a command reaches the drive, fractions rounded up."""
+        return math.ceil(float(np.max(self.command_delay)))
 
     def reach(self, arm: Arm, travel: FloatArray) -> float:
         """A radius around the base, in [m], that no drawn arm's tool point leaves.

@@ -13,10 +13,11 @@ from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
 from ikgym.machine import in_chunks
 from ikgym.plant.arm_kernels import Numbers, stream_rows
-from ikgym.plant.checks import PerJoint
+from ikgym.plant.checks import is_range
 from ikgym.plant.contact import Contacts
 from ikgym.plant.draw import Draws, Keys, arm_key, episode_key
 from ikgym.plant.plant import Plant
+from ikgym.plant.response import PAST, Response
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
 from ikgym.validation import FloatArray, one_a_row
@@ -78,13 +79,19 @@ class PlantRows:
         self.contacts = contacts
         self._draws = Draws(plant, arm)
 
-        def every_joint(value: PerJoint) -> FloatArray:
+        def every_joint(value: Any) -> FloatArray:
             return np.array(np.broadcast_to(value, n), dtype=np.float64)
 
+        whole = every_joint(0.0 if is_range(plant.command_delay) else np.floor(plant.command_delay))
+        self._response = Response.of(plant, n, dt)
         self.drives = Drives(
             every_joint(plant.bias),
             every_joint(plant.noise),
             every_joint(plant.backlash),
+            every_joint(0.0 if is_range(plant.command_delay) else plant.command_delay) - whole,
+            self._response.coefficients,
+            every_joint(plant.gain),
+            self._response.free,
             np.array(arm.chain.prismatic),
             plant.payload_step,
         )
@@ -98,13 +105,15 @@ class PlantRows:
         self.context = np.zeros((rows, len(plant.context)))
         self.state = PlantState(
             keys=np.zeros((rows, STREAMS), dtype=np.uint64),
-            lag=np.zeros(rows),
-            delay=np.zeros(rows, dtype=np.int64),
+            lag=np.zeros((rows, n)),
+            delay=np.zeros((rows, n), dtype=np.int64),
             pose_noise=np.zeros(rows),
             pose_rotation_noise=np.zeros(rows),
             pose_every=np.zeros(rows, dtype=np.int64),
             drive=np.zeros((rows, n)),
             play=np.zeros((rows, n)),
+            past=np.zeros((rows, len(self._response.coefficients), PAST)),
+            swing=np.zeros((rows, len(self._response.free), 3)),
             commands=np.zeros((rows, max(plant.longest_command_delay + 1, commands), n)),
             q=np.zeros((rows, plant.q_delay + 1, n)),
             pose=np.zeros((rows, plant.poses_underway, coordinates)),
@@ -119,7 +128,7 @@ class PlantRows:
     def size(plant: Plant, joints: int, coordinates: int, commands: int) -> int:
         """Numbers that a row takes."""
         kept = joints * (plant.longest_command_delay + 1 + commands + plant.q_delay + 1)
-        return 2 * (6 * joints + 12) + kept + coordinates * (plant.poses_underway + 1) + 4 * joints
+        return 2 * (6 * joints + 12) + kept + coordinates * (plant.poses_underway + 1) + (6 + PAST + 3) * joints
 
     def begin(
         self,
@@ -148,7 +157,8 @@ class PlantRows:
         if noise_seeds is not None:
             keys = [noise_key(key, noise_seeds[row]) for key, row in zip(keys, rows.tolist(), strict=True)]
         stream_rows(np.array(keys, dtype=np.uint64), rows, self.state.keys)
-        self.state.drive[rows] = self.state.play[rows] = 0.0
+        for array in (self.state.drive, self.state.play, self.state.past, self.state.swing):
+            array[rows] = 0.0
         if self.contacts is not None:
             self.contacts.stopped[rows] = False
         of_arms = np.array(arm_keys, dtype=np.uint64)
@@ -175,9 +185,14 @@ class PlantRows:
 
     def _set(self, rows: Integers, numbers: Numbers, context: FloatArray) -> None:
         """Sets the numbers that rows have drawn from ranges."""
+        plant = self._plant
         self.context[rows] = context
-        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)
-        self.state.delay[rows] = numbers.command_delay
+        self.state.lag[rows] = -np.expm1(-2.0 * np.pi * numbers.bandwidth * self._dt)[:, None]
+        self.state.delay[rows] = numbers.command_delay[:, None]
+        if isinstance(plant.bandwidth, tuple) and not is_range(plant.bandwidth):
+            self.state.lag[rows] = -np.expm1(-2.0 * np.pi * np.array(plant.bandwidth) * self._dt)
+        if not is_range(plant.command_delay):
+            self.state.delay[rows] = np.floor(plant.command_delay)
         for name in ("pose_noise", "pose_rotation_noise", "pose_every"):
             getattr(self.state, name)[rows] = getattr(numbers, name)
 
@@ -193,6 +208,11 @@ class PlantRows:
         for ring in (state.q, state.pose):
             ring[rows] = ring[rows, :1]
         state.commands[rows], state.drive[rows], state.shown_step[rows] = qdot[:, None], qdot, steps
+        reached = qdot * self._response.steady
+        if state.past.size:
+            state.past[rows] = np.repeat(np.stack([reached, qdot], axis=2), PAST // 2, axis=2)
+        if state.swing.size:
+            state.swing[rows, :, 2] = reached * self.drives.gain
 
 
 def noise_key(key: int, noise_seed: int) -> int:

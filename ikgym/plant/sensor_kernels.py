@@ -16,26 +16,28 @@ STREAMS = 5
 
 
 @inlined
-def measure_q(sensors, keys, row, step, q, kept, out):
-    """Measures joint coordinates, and shows those that have arrived.
+def measure_q(sensors, plant, row, step, q, out):
+    """Measures joint coordinates on the drive's side of resonances, and shows those that have arrived.
 
     Args:
         sensors: A :class:`ikgym.plant.step.Sensors`.
-        keys: Of the row's streams. Shape (5,).
+        plant: A :class:`ikgym.plant.step.PlantState`, whose measurements on their way are changed in place.
         row: The arm.
         step: Steps made.
         q: Joint coordinates. Shape (N, n).
-        kept: Measurements that are on their way. Shape (N, delay + 1, n).
         out: Receives the measurements. Shape (N, n).
 
     Returns:
         Steps since it was measured.
     """
-    n, room = q.shape[1], kept.shape[1]
+    n, kept = q.shape[1], plant.q
+    room = kept.shape[1]
     for j in range(n):
         value = q[row, j]
+        if plant.swing.shape[1] > 0:
+            value -= plant.swing[row, j, 0]
         if sensors.q_noise[j] != 0.0:
-            value += sensors.q_noise[j] * normal(keys[Q_NOISE], np.uint64(step * n + j))
+            value += sensors.q_noise[j] * normal(plant.keys[row, Q_NOISE], np.uint64(step * n + j))
         kept[row, step % room, j] = value
     late = max(step - sensors.q_delay, 0)
     for j in range(n):

@@ -32,23 +32,31 @@ def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
 
     Args:
         values: The fields of a plant at severity 1.
-        severity: Time constants, backlash, bias and noise grow with it in proportion, and delays, rounded to whole
-            steps.
+        severity: Time constants, periods of resonances, backlash, bias, noise and the difference of gains from 1 grow
+            with it in proportion, and delays, rounded to whole steps where they are whole.
     """
     out = {name: scaled(values[name], severity) for name in DRIVES}
     if severity == 0.0:
-        return out | {"command_delay": 0, "bandwidth": math.inf}
+        return out | {"command_delay": 0, "bandwidth": math.inf, "resonance": math.inf, "gain": 1.0}
     late = whole(values["command_delay"], severity)
-    return out | {"command_delay": late, "bandwidth": scaled(values["bandwidth"], 1.0 / severity)}
+    out |= {name: scaled(values[name], 1.0 / severity) for name in ("bandwidth", "resonance")}
+    return out | {"command_delay": late, "gain": scaled(values["gain"], severity, 1.0)}
 
 
 def whole(value: Any, factor: float, least: int = 0) -> Any:
-    """A whole number, or each of a tuple of them, with its excess over the least one times a factor, rounded."""
+    """A whole number, or each of a tuple of them, with its excess over the least one times a factor, rounded.
+
+    Numbers with a fraction stay unrounded, as do those beside them.
+    """
+    if np.any(np.mod(value, 1.0)):
+        return scaled(value, factor, least)
     if isinstance(value, tuple):
         return tuple(whole(part, factor, least) for part in value)
     return least + round(factor * (value - least))
 
 
-def scaled(value: Any, factor: float) -> Any:
-    """A number, or a tuple of numbers, times a factor."""
-    return tuple(float(part) for part in factor * np.array(value)) if isinstance(value, tuple) else factor * value
+def scaled(value: Any, factor: float, middle: float = 0.0) -> Any:
+    """A number, or a tuple of numbers, with its difference from the middle times a factor."""
+    if isinstance(value, tuple):
+        return tuple(float(part) for part in middle + factor * (np.array(value) - middle))
+    return middle + factor * (value - middle)

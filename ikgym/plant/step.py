@@ -17,7 +17,7 @@ from ikgym.kernels.outcome import OBSTACLE, more_parts, more_size, parts, size
 from ikgym.kernels.simulation import Constants, Floats, Integers, State, commanded, show_row
 from ikgym.kernels.tasks import error_size
 from ikgym.plant.contact import measure, place_of_boxes, touches
-from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, remembered
+from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, hold, remembered, shaped, swung
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
 
 _parts, _more_parts, _size, _more_size = expanded(parts), expanded(more_parts), inlined(size), inlined(more_size)
@@ -30,6 +30,10 @@ class Drives(NamedTuple):
         bias: In [rad/s] or [m/s]. Shape (n,).
         noise: In [rad/s] or [m/s]. Shape (n,).
         backlash: In [rad] or [m]. Shape (n,).
+        fraction: Part of a delay beyond whole steps. Shape (n,).
+        coefficients: Of drives of low order, see :attr:`ikgym.Plant.drive`. Shape (n, 7), or (0, 7) without.
+        gain: Factors of the velocities. Shape (n,).
+        free: See :func:`ikgym.plant.drive_kernels.swung`. Shape (n, 4), or (0, 4) without resonances.
         prismatic: True where a joint is prismatic. Shape (n,).
         payload_step: Steps made when the payload is taken up.
     """
@@ -37,6 +41,10 @@ class Drives(NamedTuple):
     bias: Floats
     noise: Floats
     backlash: Floats
+    fraction: Floats
+    coefficients: Floats
+    gain: Floats
+    free: Floats
     prismatic: npt.NDArray[np.bool_]
     payload_step: int
 
@@ -55,13 +63,15 @@ class PlantState(NamedTuple):
 
     Attributes:
         keys: Of the rows' streams of random numbers. Shape (N, 5).
-        lag: The share of the gap to a commanded velocity that a step closes, 1 without lag. Shape (N,).
-        delay: Steps after which a command reaches the drive. Shape (N,).
+        lag: The share of the gap to a commanded velocity that a step closes, 1 without lag. Shape (N, n).
+        delay: Whole steps after which a command reaches the drive. Shape (N, n).
         pose_noise: Standard deviation of each part of a measured position, in [m]. Shape (N,).
         pose_rotation_noise: The same of the rotation vector of the orientation, in [rad]. Shape (N,).
         pose_every: Steps from one measurement of the pose to the next. Shape (N,).
         drive: Velocities of the drives in [rad/s] or [m/s]. Shape (N, n).
         play: How far drives are from the middle of their backlash, in [rad] or [m]. Shape (N, n).
+        past: Past of drives of low order, see :func:`ikgym.plant.drive_kernels.shaped`. Shape (N, n or 0, 6).
+        swing: See :func:`ikgym.plant.drive_kernels.swung`. Shape (N, n or 0, 3).
         commands: The last commands in [rad/s] or [m/s]; that of step k is number k mod D. Shape (N, D, n).
         q: The last measured joint coordinates; those of step k are number k mod Q. Shape (N, Q, n).
         pose: The last measured poses; the i-th is number i mod S. Shape (N, S, m).
@@ -77,6 +87,8 @@ class PlantState(NamedTuple):
     pose_every: Integers
     drive: Floats
     play: Floats
+    past: Floats
+    swing: Floats
     commands: Floats
     q: Floats
     pose: Floats
@@ -211,7 +223,7 @@ def _rows(
             )
             true_q, true_pose = more.true_q, more.true_pose
             if contacts is not None:
-                _meet(contacts, arm, state, plant.drive, row, loaded, moving, k == drives.payload_step)
+                _meet(contacts, arm, state, plant, row, loaded, moving, k == drives.payload_step)
                 _show_contacts(contacts, row, k, constants.counted[k], more)
             else:
                 more.clearance[row], more.stopped[row], more.proximity_cost[row] = math.inf, 0.0, 0.0
@@ -227,7 +239,7 @@ def _rows(
 
 
 @inlined
-def _meet(contacts, chain, state, drive, row, loaded, moving, loading):
+def _meet(contacts, chain, state, plant, row, loaded, moving, loading):
     """Takes the motion of a row back in which bodies touch, and lets the arm stand still from then on."""
     q, qdot, k = state.q, state.qdot, state.step[row]
     if not moving:
@@ -241,7 +253,8 @@ def _meet(contacts, chain, state, drive, row, loaded, moving, loading):
             return
     first, second, touched = contacts.pair[row, 0], contacts.pair[row, 1], not contacts.stopped[row]
     for j in range(q.shape[1]):
-        q[row, j], qdot[row, j], drive[row, j] = before[j], 0.0, 0.0
+        q[row, j], qdot[row, j] = before[j], 0.0
+        hold(plant, row, j, 0.0, 1.0)
     contacts.stopped[row] = True
     measure(contacts, chain, row, loaded, k, q[row])
     if touched:
@@ -263,7 +276,7 @@ def _show_contacts(contacts, row, k, counted, more):
 
 @inlined
 def _move(constants, drives, state, plant, row, clipped, at_limit):
-    """Moves the joints of a row: delay, velocity limit, acceleration limit, lag, bias and noise, backlash, stop."""
+    """Moves the joints of a row, with the effects in the order that :class:`ikgym.Plant` states."""
     dt, velocity_limit, limits = constants.dt, constants.velocity_limit, constants.limits
     q, qdot, limited = state.q, state.qdot, constants.limits.shape[0] > 0
     n, now = q.shape[1], state.step[row]
@@ -271,25 +284,33 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
         applied = commanded(state.actions[row, j], velocity_limit[j], clipped, row)
         if len(plant) > 0:
             plant.commands[row, now % plant.commands.shape[1], j] = applied
-            applied = remembered(plant.commands, row, now - plant.delay[row], j)
+            arrived = now - plant.delay[row, j]
+            applied = remembered(plant.commands, row, arrived, j)
+            if drives.fraction[j] != 0.0:
+                applied += drives.fraction[j] * (remembered(plant.commands, row, arrived - 1, j) - applied)
         slack = SLACK * velocity_limit[j]
         if limited:
             applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
         velocity = applied
         if len(plant) > 0:
-            if plant.lag[row] < 1.0:
-                velocity = filtered(plant.drive, row, j, plant.lag[row], applied)
+            if plant.lag[row, j] < 1.0:
+                velocity = filtered(plant.drive, row, j, plant.lag[row, j], applied)
+            if drives.coefficients.shape[0] > 0:
+                velocity = shaped(drives.coefficients, plant.past, row, j, velocity)
+            velocity *= drives.gain[j]
             key = plant.keys[row, NOISE]
             velocity = disturbed(velocity, drives.bias[j], drives.noise[j], key, counter_of(now, n, j))
         way = dt * velocity
         if len(plant) > 0:
             way = engaged(plant.play, row, j, drives.backlash[j], way)
+            if drives.free.shape[0] > 0:
+                way = swung(drives.free, plant.swing, row, j, way, dt)
         reached = q[row, j] + way  # Varga 2021, eq. 5
         if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
             reached, applied = stopped(limits, j, q[row, j], reached, dt)
             at_limit[row, 0] += abs(velocity - applied) > slack
             if len(plant) > 0:
-                plant.drive[row, j] = applied
+                hold(plant, row, j, applied, drives.gain[j])
         q[row, j], qdot[row, j] = reached, applied
 
 
@@ -306,7 +327,7 @@ def _recall(limits, commands, row, now, out):
 def _sense(sensors, plant, kind, state, row, frame, shown, more):
     """Writes the measurements of the sensors; called last, since the noise is added to the pose in place."""
     now, (rotation, position) = state.step[row], frame
-    more.q_age[row, 0] = measure_q(sensors, plant.keys[row], row, now, state.q, plant.q, shown.q)
+    more.q_age[row, 0] = measure_q(sensors, plant, row, now, state.q, shown.q)
     arrived = measure_pose(sensors, plant, row, kind, now, rotation, position)
     if arrived >= 0:
         plant.shown_step[row] = arrived

@@ -29,6 +29,7 @@ from ikgym.obstacles import MOST_OBSTACLES, Obstacle, random_boxes
 from ikgym.obstacles.solids import solids_of
 from ikgym.plant import DrawnPlant, Plant
 from ikgym.plant.draw import Draws, arm_key, episode_key
+from ikgym.plant.response import deflection, fastest
 from ikgym.scenarios import files
 from ikgym.scenarios.preview import Preview, furthest
 from ikgym.tasks import Task
@@ -353,8 +354,9 @@ class Scenario(Frozen):
 
     def joint_bound(self) -> FloatArray:
         """Absolute joint coordinates that no arm exceeds in an episode, in [rad] or [m]. Shape (n,)."""
-        added: FloatArray = np.abs(self.plant.bias) + np.abs(self.plant.noise)
-        travelled = self.start_bound() + self.steps * self.dt * (self.velocity_limit + added)
+        plant, limit = self.plant, self.velocity_limit
+        travelled = self.start_bound() + self.steps * self.dt * fastest(plant, limit)
+        travelled += deflection(plant, limit, self.dt)
         return np.minimum(travelled, farthest(self.arm))
 
     @property

@@ -14,7 +14,7 @@ from baselines.wrapper import NamedWrapper
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import furthest
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import LARGEST, FloatArray, whole_number
 
 if TYPE_CHECKING:
     from ikgym.plant import DrawnPlant
@@ -64,8 +64,9 @@ class Told(NamedWrapper):
         object.__setattr__(self, "drawn", scenario.drawn_plant(self.seed or 0, self.arm_seed))
         super().__post_init__()
         delay, bandwidth = self.drawn.command_delay, self.drawn.bandwidth
-        if delay > 0 or bandwidth < math.inf:
-            known = {"delay": delay, "bandwidth": bandwidth if bandwidth < math.inf else None, "identify": False}
+        if np.any(delay) or np.min(bandwidth) < math.inf:
+            lag = tuple(np.minimum(bandwidth, LARGEST)) if np.ndim(bandwidth) else bandwidth
+            known = {"delay": delay, "bandwidth": None if lag == math.inf else lag, "identify": False}
             kind = registry.get(PREDICTED)
             driven = kind(self.inner_problem(), policy=self.policy, options=self.options, **known)  # type: ignore[call-arg]
             object.__setattr__(self, "inner", driven)
