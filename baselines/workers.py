@@ -17,8 +17,8 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from ikgym import machine
 from ikgym.exceptions import IkgymError, MissingDependencyError
+from ikgym.kernels import threads
 from ikgym.validation import known_name, whole_number
 
 logger = logging.getLogger("ikgym")
@@ -212,7 +212,7 @@ def _tasks() -> Iterator[Call]:
 
 def _on_one_core(function: Callable[[Any], Any], unit: Any) -> tuple[Any, Exception | None]:
     """Result and error of a unit: Ray replaces exceptions by its own."""
-    machine.limit(1)
+    threads.limit_cores(1)
     try:
         return function(unit), None
     except Exception as e:

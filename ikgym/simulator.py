@@ -15,7 +15,7 @@ from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
-from ikgym.machine import check_memory, in_chunks, of_rows
+from ikgym.kernels.threads import in_chunks
 from ikgym.options import checked_starts, checked_steps, entered_states, take_actions
 from ikgym.plant.rows import PlantRows, checked_arm_seeds
 from ikgym.plant.step import step
@@ -24,7 +24,7 @@ from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
 from ikgym.scenarios.frames import MotionFrames, frames_of_rows
 from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, check_memory, whole_number
 
 # Rows worth a thread of their own: below, handing over costs more than it saves.
 GRAIN_STEP = 256
@@ -64,7 +64,7 @@ class Simulator:
             obstacles = len(scenario.surroundings.boxes) if scenario.obstacles_shown else 0
             shown += more_size(joints, coordinates, commands, obstacles)
         kept = 0 if ideal else PlantRows.size(scenario.plant, joints, coordinates, commands)
-        check_memory(f"{rows} environments", of_rows(rows, shown, math.prod(self._nominal.shape) + rows * kept))
+        check_memory(f"{rows} environments", _bytes_of(rows, shown, math.prod(self._nominal.shape) + rows * kept))
         self._shared = Constants(
             kind=scenario.task.kind,
             dt=scenario.dt,
@@ -286,3 +286,9 @@ class Simulator:
 
     def _outcome(self, numbers: FloatArray) -> Outcome:
         return outcome(numbers, *self._shape, late=self._late)
+
+
+def _bytes_of(rows: int, shown: int, frames: int) -> int:
+    """About how much memory N arms take, in bytes, by the numbers that a row shows and those of all nominal frames."""
+    # Observations have copies: state, actions, bounds of the spaces. A row's generator takes the rest.
+    return rows * (5 * 8 * shown + 1500) + 8 * frames

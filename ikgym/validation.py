@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -25,6 +26,13 @@ IDENTITY = np.eye(3)
 
 # Lengths, angles, times and speeds of a scenario lie within: far beyond any arm, and no product of them overflows.
 SMALLEST, LARGEST = 1e-12, 1e12
+
+GIB = 2**30
+# Less than this, in bytes, is not checked.
+SMALL = 2**28
+# Files of Linux: the memory available to all, and the limit and the use of a control group.
+SYSTEM = Path("/proc/meminfo")
+GROUP = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current"))
 
 
 def float_array(
@@ -315,3 +323,31 @@ def shortened(value: object, limit: int = 120) -> str:
     """A value in one line for messages, truncated if it is long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+def check_memory(name: str, needed: int) -> None:
+    """Checks that there is memory for a number of bytes; the name begins the message."""
+    if needed <= SMALL:
+        return
+    left = available_memory()
+    if left is not None and needed > left:
+        raise InvalidInputError(
+            f"{name}: expected to fit into memory, but take about {gib(needed)}, and {gib(left)} are available."
+        )
+
+
+def gib(amount: int) -> str:
+    """A number of bytes in words."""
+    return f"{amount // GIB:,} GiB" if amount >= 100 * GIB else f"{amount / GIB:.1f} GiB"
+
+
+def available_memory() -> int | None:
+    """The memory that this process can still take, in bytes; None where the system does not say."""
+    known = []
+    with contextlib.suppress(OSError, StopIteration, ValueError):
+        lines = SYSTEM.read_text().splitlines()
+        known.append(next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")))
+    with contextlib.suppress(OSError, ValueError):  # "max" is no number: no bound
+        most, taken = (int(file.read_text()) for file in GROUP)
+        known.append(max(most - taken, 0))
+    return min(known, default=None)

@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 
 import ikgym
 import ikgym.simulator as simulator_module
-from ikgym import machine
+from ikgym.kernels import threads
 from ikgym.simulator import Simulator
 from ikgym.trajectories import Helix, RandomSinusoid, Trajectory
 from tests.comparison import identical
@@ -91,7 +91,7 @@ def test_episodes_begin_with_the_frames_that_are_shown_alone(name):
 
 def test_threads_do_not_disturb_each_other(monkeypatch):
     """All rows of a step in several threads against the same in one."""
-    monkeypatch.setattr(machine, "cores", lambda: 4)
+    monkeypatch.setattr(threads, "count_cores", lambda: 4)
     rows, outcomes = 400, {}
     actions = np.random.default_rng(0).uniform(-1, 1, (5, rows, 7))
     for grain in (100, rows):

@@ -22,7 +22,7 @@ from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits
-from ikgym.machine import cores
+from ikgym.kernels.threads import count_cores
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
@@ -286,7 +286,7 @@ def describe() -> dict[str, Any]:
     """CPU, the cores that this process may use, and the versions that matter to a number."""
     return {
         "cpu": _cpu(),
-        "cores": cores(),
+        "cores": count_cores(),
         "system": platform.system(),
         "python": platform.python_version(),
         "numpy": np.__version__,

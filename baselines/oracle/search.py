@@ -16,7 +16,7 @@ from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM, Optimum, Search, Star
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
-from ikgym.machine import in_chunks
+from ikgym.kernels.threads import in_chunks
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ikgym import machine
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
 from ikgym.kernels.kinematics import Chain, forward_rows, stacked
+from ikgym.kernels.threads import in_chunks
 from ikgym.validation import BoolArray, FloatArray, ending, number, rotation_matrices, whole_number
 
 # 1 rad weighs as much as this share of the arm's length; shares from 0.1 to 0.8 differ by less than a fifth.
@@ -61,7 +61,7 @@ def inverse(
 
     # A look takes less time than a timer that is never needed.
     with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
-        machine.in_chunks(work, len(q), GRAIN)
+        in_chunks(work, len(q), GRAIN)
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ikgym.arms import Arm
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.random_numbers import stream
-from ikgym.machine import in_chunks
+from ikgym.kernels.threads import in_chunks
 from ikgym.plant.arm_kernels import Numbers, stream_rows
 from ikgym.plant.checks import is_range
 from ikgym.plant.contact import Contacts

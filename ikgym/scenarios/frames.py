@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ikgym.kernels.kinematics import Chain
 from ikgym.kernels.motions import Motions
-from ikgym.machine import in_chunks
+from ikgym.kernels.threads import in_chunks
 from ikgym.scenarios.scenario import Scenario
 from ikgym.trajectories import JointMotions, Trajectory
 from ikgym.validation import FloatArray

@@ -24,7 +24,6 @@ from ikgym.kernels.bodies import Surroundings
 from ikgym.kernels.kinematics import Chain, stacked
 from ikgym.kernels.rotations import geodesic_angle, quaternion_of
 from ikgym.kernels.simulation import nominal_rows
-from ikgym.machine import check_memory, gib
 from ikgym.obstacles import MOST_OBSTACLES, Obstacle, random_boxes
 from ikgym.obstacles.solids import solids_of
 from ikgym.plant import DrawnPlant, Plant
@@ -40,8 +39,10 @@ from ikgym.validation import (
     FloatArray,
     Positive,
     about,
+    check_memory,
     flag,
     frozen_array,
+    gib,
     known_names,
     read_only,
     shortened,

@@ -28,8 +28,8 @@ from baselines.registry import get
 from baselines.solvers.references.follow_nominal import PrivilegedPath
 from baselines.status import Status
 from baselines.wrapper import Wrapper
-from ikgym import machine
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels import threads
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.plant import DrawnPlant
 from ikgym.plant.draw import Draws
@@ -121,14 +121,14 @@ def test_batch_equals_single_calls_and_memory_goes_by_rows(name, on):
 
 @every_policy
 def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name):
-    policy, threads, solve = policy_for(name, usual(name)), set(), get(name).solve
+    policy, callers, solve = policy_for(name, usual(name)), set(), get(name).solve
 
     def watched(self, batch, memory):
-        threads.add(threading.get_ident())
+        callers.add(threading.get_ident())
         return solve(self, batch, memory)
 
     monkeypatch.setattr(type(policy), "solve", watched)
-    monkeypatch.setattr(machine, "cores", lambda: 2)
+    monkeypatch.setattr(threads, "count_cores", lambda: 2)
     whole, shared = None, None
     for k, observation in enumerate(itertools.islice(observations(usual(name), policy.preview, 5), 3)):
         start = np.array([k == 0, k == 2, False, False, k == 1])
@@ -138,7 +138,7 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name):
         action, shared = policy.predict(observation, shared, start)
         assert identical(action, expected)
         assert identical(shared, whole)
-    assert len(threads) > 1
+    assert len(callers) > 1
 
 
 @every_policy

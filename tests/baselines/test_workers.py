@@ -11,8 +11,8 @@ import time
 import pytest
 
 from baselines.workers import Workers, finished
-from ikgym import machine
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
+from ikgym.kernels import threads
 
 FAR = Workers(cluster="ray")
 EVALUATE = ("evaluate", "--scenarios", "varga7-random", "--episodes", "400", "--policies", "rhc:horizon=100,starts=1")
@@ -103,12 +103,12 @@ def test_without_ray_the_extra_is_named(monkeypatch):
 
 
 def test_fewer_cores(monkeypatch):
-    monkeypatch.setattr(machine, "_limit", None)
-    everything = machine.cores()
-    machine.limit(1)
-    assert machine.cores() == 1
-    machine.limit(None)
-    assert machine.cores() == everything
+    monkeypatch.setattr(threads, "_limit", None)
+    everything = threads.count_cores()
+    threads.limit_cores(1)
+    assert threads.count_cores() == 1
+    threads.limit_cores(None)
+    assert threads.count_cores() == everything
 
 
 @needs_proc

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym import machine, scenarios
+from ikgym import scenarios, validation
 from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import Sinusoid
 from tests.every_scenario import every_scenario
@@ -70,7 +70,7 @@ def test_more_steps_than_any_memory_holds(field, steps):
 @pytest.fixture
 def little(monkeypatch):
     """A machine with 1 GiB."""
-    monkeypatch.setattr(machine, "available", lambda: machine.GIB)
+    monkeypatch.setattr(validation, "available_memory", lambda: validation.GIB)
 
 
 NO_MEMORY = r"expected to fit into memory, but take about [\d,.]+ GiB, and 1\.0 GiB are available"
@@ -98,17 +98,17 @@ def test_many_environments_need_memory(make, number):
 
 def test_what_is_available_is_what_system_and_group_leave(tmp_path, monkeypatch):
     system, most, taken = (tmp_path / name for name in ("meminfo", "max", "current"))
-    monkeypatch.setattr(machine, "SYSTEM", system)
-    monkeypatch.setattr(machine, "GROUP", (most, taken))
+    monkeypatch.setattr(validation, "SYSTEM", system)
+    monkeypatch.setattr(validation, "GROUP", (most, taken))
     system.write_text("MemTotal: 9000 kB\nMemAvailable:    4000 kB\n")
-    assert machine.available() == 4000 * 1024
+    assert validation.available_memory() == 4000 * 1024
     most.write_text("3000000\n")
     taken.write_text("1000000\n")
-    assert machine.available() == 2_000_000
+    assert validation.available_memory() == 2_000_000
     most.write_text("max\n")
-    assert machine.available() == 4000 * 1024
+    assert validation.available_memory() == 4000 * 1024
     system.unlink()
-    assert machine.available() is None or machine.available() > 0
+    assert validation.available_memory() is None or validation.available_memory() > 0
 
 
 def test_rewards_that_stable_baselines3_cannot_hold():

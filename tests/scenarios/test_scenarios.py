@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import ikgym
-from ikgym import machine, scenarios
+from ikgym import scenarios
 from ikgym.exceptions import IkgymError, UnknownNameError
+from ikgym.kernels import threads
 from ikgym.plant import Plant
 from tests.every_scenario import every_scenario
 
@@ -76,14 +77,14 @@ def test_disturbance_moves_the_arm_as_said():
 
 
 def test_chunks_cover_all_rows_once(monkeypatch):
-    monkeypatch.setattr(machine, "cores", lambda: 4)
+    monkeypatch.setattr(threads, "count_cores", lambda: 4)
     for rows in (0, 1, 7, 100, 1001):
         seen = np.zeros(rows, dtype=int)
 
         def work(start, stop, seen=seen):
             seen[start:stop] += 1
 
-        machine.in_chunks(work, rows, grain=10)
+        threads.in_chunks(work, rows, grain=10)
         assert (seen == 1).all()
 
 

@@ -17,7 +17,7 @@ from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.jacobian import jacobian_gradient_rows, jacobian_rows
 from baselines.training.gradients.segment import Path, Rows, Task, segment
 from ikgym.exceptions import InvalidInputError
-from ikgym.machine import in_chunks
+from ikgym.kernels.threads import in_chunks
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray

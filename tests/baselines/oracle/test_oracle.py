@@ -19,8 +19,8 @@ from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
-from ikgym import machine
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.kernels import threads
 from ikgym.plant import Plant
 from ikgym.trajectories import RandomJointSpline
 from tests.comparison import identical
@@ -94,7 +94,7 @@ def test_the_policy_plays_the_optimum(name):
 def test_the_same_whatever_the_number_of_threads(monkeypatch):
     scenario, results = short("varga7-random", 65), []
     for cores in (1, 5):
-        monkeypatch.setattr(machine, "cores", lambda cores=cores: cores)
+        monkeypatch.setattr(threads, "count_cores", lambda cores=cores: cores)
         optimum = solve(scenario, 3, QUICK, cached=False)
         results.append((optimum.q, optimum.qdot, optimum.cost, *(dataclasses.astuple(one) for one in optimum.starts)))
     assert identical(results[0][:3], results[1][:3])

@@ -10,7 +10,7 @@ from baselines.controller import Drives
 from baselines.episodes import rollouts
 from baselines.policy import Problem
 from baselines.policy_kernels import sent_rows
-from ikgym import machine
+from ikgym.kernels import threads
 from ikgym.simulator import Simulator
 from tests.comparison import identical
 
@@ -34,12 +34,12 @@ def played(policy, rows, spoil):
         yield action, state, seen["qdot"]
 
 
-@pytest.mark.parametrize("threads", [False, True])
+@pytest.mark.parametrize("shared", [False, True])
 @pytest.mark.parametrize("text", POLICIES)
-def test_an_observed_velocity_changes_nothing_after_the_first_step(text, threads, monkeypatch):
+def test_an_observed_velocity_changes_nothing_after_the_first_step(text, shared, monkeypatch):
     policy = made(text)
-    if threads:
-        monkeypatch.setattr(machine, "cores", lambda: 2)
+    if shared:
+        monkeypatch.setattr(threads, "count_cores", lambda: 2)
         monkeypatch.setattr(type(policy), "grain", 1)
     true, spoilt = played(policy, 3, 0.0), played(policy, 3, 0.3)
     for (action, state, qdot), (other, same, _) in zip(true, spoilt, strict=True):
