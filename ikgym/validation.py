@@ -260,6 +260,7 @@ def choice(name: str, value: Any, available: Iterable[str]) -> str:
 #: Fields of frozen dataclasses that name their check: a number of either sign, and one from 1e-12 to 1e12.
 Signed = Annotated[float, Bounds(at_least=-LARGEST, at_most=LARGEST)]
 Positive = Annotated[float, Bounds(at_least=SMALLEST, at_most=LARGEST)]
+Seed = Annotated[int, Bounds(at_least=0)]
 Flag = Annotated[bool, flag]
 #: Arrays up to 1e12: of shape (n,); of shape (3,); likewise, but not 0; likewise, all of at least 1e-12.
 Numbers = Annotated[FloatArray, functools.partial(frozen_array, shape=(None,), at_most=LARGEST)]

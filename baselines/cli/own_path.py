@@ -14,16 +14,17 @@ from ikgym import arms, scenarios, tasks
 from ikgym.arms import Arm
 from ikgym.arms.urdf import open_meshes
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import from_csv
-from ikgym.validation import number, per_joint
+from ikgym.validation import Bounds, per_joint
 
 #: Where nobody states the acceleration of the tool, it comes to its speed within this time in [s].
 SPEEDING_UP = 0.2
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class RobotOptions:
+class RobotOptions(Frozen):
     """The chain of a URDF file, and the facts that the file does not state."""
 
     base: Annotated[str | None, tyro.conf.arg(metavar="LINK")] = None
@@ -65,7 +66,6 @@ class RobotOptions:
 
 #: The names of these options.
 ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--packages", "--bodyless", "--acceleration")
-TOOL = "--tool-acceleration"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,9 +76,9 @@ class OwnPath(RobotOptions):
     """FILE.toml, the name of a scenario, or FILE.csv with waypoints."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="ARM")] = None
     """For a CSV file: the name of an arm, or FILE.urdf."""
-    speed: Annotated[float | None, tyro.conf.arg(metavar="V")] = None
+    speed: Annotated[float | None, tyro.conf.arg(metavar="V"), Bounds(above=0.0)] = None
     """Speed of the tool in [m/s]; needed for a CSV file without times."""
-    tool_acceleration: Annotated[float | None, tyro.conf.arg(metavar="A")] = None
+    tool_acceleration: Annotated[float | None, tyro.conf.arg(metavar="A"), Bounds(above=0.0)] = None
     """Acceleration of the tool in [m/s²]; by default it comes to its speed within 0.2 s."""
     corner_radius: Annotated[float | None, tyro.conf.arg(metavar="R")] = None
     """Radius of the arcs that round corners in [m]; a smooth curve through all points if left out."""
@@ -89,7 +89,7 @@ class OwnPath(RobotOptions):
     """Control period in [s]: 0.004 by default, or that of the scenario."""
 
 
-_WITH_CSV = (*ROBOT_OPTIONS[:5], "--speed", TOOL, "--corner-radius", "--task")
+_WITH_CSV = (*ROBOT_OPTIONS[:5], "--speed", "--tool-acceleration", "--corner-radius", "--task")
 RULES = (
     Rule(("--arm", *_WITH_CSV), lambda given: given.file.endswith(".csv"), "without a CSV file"),
     Rule(ROBOT_OPTIONS[:5], lambda given: (given.arm or "").endswith(".urdf"), "without a URDF file"),
@@ -136,8 +136,8 @@ def _from_csv(options: OwnPath) -> Scenario:
     arm, speed = options.robot(options.arm), options.speed
     law: dict[str, Any] = {}
     if speed is not None:
-        usual, given = number("--speed", speed, above=0.0) / SPEEDING_UP, options.tool_acceleration
-        law = {"speed": speed, "acceleration": usual if given is None else number(TOOL, given, above=0.0)}
+        given = options.tool_acceleration
+        law = {"speed": speed, "acceleration": speed / SPEEDING_UP if given is None else given}
     trajectory = from_csv(options.file, corner_radius=options.corner_radius, **law)
     task = options.task or ("pose" if trajectory.has_orientation else "position")
     dt = 0.004 if options.dt is None else options.dt

@@ -15,22 +15,28 @@ import tyro
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import check_sizes
+from ikgym.validation import Bounds, Seed, check_sizes
 
 #: Patterns in messages of tyro, and plainer texts.
-PLAINER = (
+PLAINER: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"no type matching (?:\{None\}\|)?(\S+) could be instantiated from \['(.*?)'\].*", r"expected \1, got '\2'"),
     (r"invalid literal for int\(\) with base 10: ", "expected a whole number, got "),
     (r"could not convert string to float: ", "expected a number, got "),
     (r"Expected 1 values", "Expected one"),
     (r"Error parsing [A-Z]\w+: ", ""),
+    (r"^(\w+): expected", lambda found: f"--{found[1].replace('_', '-')}: expected"),
     (r" Arguments are applied to the directly preceding subcommand.*", ""),
     (r"(Missing from .*?: --\S+).*", r"\1"),
 )
 
 
 T = TypeVar("T")
+
+#: Options that are a number of at least 1, and a seed.
+Count = Annotated[int, tyro.conf.arg(metavar="N"), Bounds(at_least=1)]
+SeedOption = Annotated[Seed, tyro.conf.arg(metavar="N")]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,16 +90,16 @@ def if_random(name: str, scenario: Callable[[Any], str | Scenario] = lambda give
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class EpisodeOptions:
+class EpisodeOptions(Frozen):
     """The episode that a command shows."""
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-fast"
     """Name of a scenario, FILE.toml or MODULE:ATTRIBUTE."""
     policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ()
     """Policies side by side, as evaluate takes them; the one that the scenario names if left out, else qp."""
-    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    seed: SeedOption = 0
     """Reset seed of the episode."""
-    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    steps: Count | None = None
     """Number of steps; all of the scenario if left out."""
 
     def policies(self, scenario: Scenario) -> tuple[str, ...]:

@@ -20,9 +20,8 @@ import numpy as np
 import tyro
 
 from baselines.cli.parsing import Rule, parse
-from baselines.workers import MOST
 from ikgym.exceptions import IkgymError, UnknownNameError, printable
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray
 
 #: The console command in front of all others.
 CONSOLE = "ikgym"
@@ -142,7 +141,7 @@ class Command(Generic[P]):
 
     Args:
         name: The word behind ``ikgym``.
-        options: The dataclass of its options. `workers`, `episodes` and `trials`, if there are such, are checked.
+        options: The dataclass of its options; one derived from :class:`Frozen` checks them by their annotations.
         manual: Makes the text of ``--help`` above the options, given the name of the program.
         work: Does the work, given the options and the whole command line; returns the exit code, or None for 0.
         rules: Options that have an effect only together with others.
@@ -168,9 +167,6 @@ class Command(Generic[P]):
             options = parse(self.options, given, prog=prog, description=self.manual(prog), rules=self.rules)
             if self.kept and (out := getattr(options, "out", "")) is not None:
                 stopped = f"Stopped. {self.kept.format(out=out)}"
-            for name, most in (("workers", MOST), ("episodes", None), ("trials", None)):
-                if (value := getattr(options, name, None)) is not None:
-                    whole_number(name, value, at_least=1, at_most=most)
             with escaped_output():
                 return self.work(options, shlex.join([*prog.split(), *given])) or 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+from typing import Annotated
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from baselines.controller import kernels
 from baselines.policy import Problem
 from ikgym.arms import Arm
 from ikgym.frozen import Frozen
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import Bounds, FloatArray
 
 
 class StopReason(enum.IntEnum):
@@ -55,17 +56,11 @@ class Guards(Frozen):
         InvalidInputError: A number is out of its range.
     """
 
-    age: int = 10
-    tolerance: float = 0.01
-    position_error: float | None = 0.02
-    orientation_error: float | None = 0.2
-    stopping_time: float = 0.25
-
-    def __post_init__(self) -> None:
-        self._settle(age=whole_number("age", self.age, at_least=0))
-        for name in ("tolerance", "position_error", "orientation_error", "stopping_time"):
-            if getattr(self, name) is not None or name in {"tolerance", "stopping_time"}:
-                self._settle(**{name: number(name, getattr(self, name), above=0.0)})
+    age: Annotated[int, Bounds(at_least=0)] = 10
+    tolerance: Annotated[float, Bounds(above=0.0)] = 0.01
+    position_error: Annotated[float, Bounds(above=0.0)] | None = 0.02
+    orientation_error: Annotated[float, Bounds(above=0.0)] | None = 0.2
+    stopping_time: Annotated[float, Bounds(above=0.0)] = 0.25
 
     def bounds(self, problem: Problem) -> FloatArray:
         """Least and largest joint coordinates in [rad] or [m], and the farthest way in a period. Shape (3, n)."""

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Annotated
 
 import numpy as np
 
 from baselines.oracle.best_known import MARGIN, MEANINGLESS, Record
 from ikgym.frozen import Frozen
-from ikgym.validation import FloatArray, read_only, whole_number
+from ikgym.validation import Bounds, FloatArray, Seed, read_only
 
 #: Names of random starts, and of paths found by iterated local search.
 RANDOM, LOCAL_SEARCH = "random start", "local search"
 SEARCHED = (RANDOM, LOCAL_SEARCH)
-#: Most random starts: all their paths are in memory at the same time.
-MOST_STARTS = 100_000
+#: Numbers of random starts: all their paths are in memory at the same time.
+Starts = Annotated[int, Bounds(at_least=0, at_most=100_000)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,19 +36,13 @@ class Search(Frozen):
         InvalidInputError: A number is out of its range.
     """
 
-    starts: int = 400
-    chains: int = 8
-    generations: int = 4
-    rounds: int = 40
-    polished: int = 6
-    knots: int = 150
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name, value in dict(vars(self)).items():
-            least = 0 if name in ("starts", "generations", "seed") else 1
-            most = MOST_STARTS if name == "starts" else None
-            object.__setattr__(self, name, whole_number(name, value, at_least=least, at_most=most))
+    starts: Starts = 400
+    chains: Annotated[int, Bounds(at_least=1)] = 8
+    generations: Annotated[int, Bounds(at_least=0)] = 4
+    rounds: Annotated[int, Bounds(at_least=1)] = 40
+    polished: Annotated[int, Bounds(at_least=1)] = 6
+    knots: Annotated[int, Bounds(at_least=1)] = 150
+    seed: Seed = 0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from baselines.oracle.cache import solve
-from baselines.oracle.optimum import Search
+from baselines.oracle.optimum import Search, Starts
 from baselines.oracle.stripped import NOTE, strips
 from baselines.policy import Batch, Memory, Problem, Solution, statuses
 from baselines.solvers.references.follow_nominal import PrivilegedPath
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import Bounds, FloatArray, Seed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,25 +38,22 @@ class Oracle(PrivilegedPath):
             number is out of range.
     """
 
-    seed: int | None = None
-    starts: int = Search.starts
-    generations: int = Search.generations
+    seed: Seed | None = None
+    starts: Starts = Search.starts
+    generations: Annotated[int, Bounds(at_least=0)] = Search.generations
     scenario: Scenario = dataclasses.field(kw_only=True)
 
     name: ClassVar[str] = "oracle"
 
     def __post_init__(self) -> None:
-        if self.seed is not None:
-            object.__setattr__(self, "seed", whole_number("seed", self.seed, at_least=0))
-        elif self.scenario.random or self.scenario.plant.draws_arm:
+        super().__post_init__()
+        if self.seed is None and (self.scenario.random or self.scenario.plant.draws_arm):
             raise InvalidInputError(f"Scenario {self.scenario.name!r} is random: a seed says which episode is meant.")
         if strips(self.scenario):
             raise InvalidInputError(
                 f"{self.name} plays a joint path that was found {NOTE}; scenario {self.scenario.name!r}: expected "
                 f"ideal ones, got {self.scenario.plant}. The reference there is told."
             )
-        for name in ("starts", "generations"):
-            object.__setattr__(self, name, whole_number(name, getattr(self, name), at_least=0))
 
     @classmethod
     def for_scenario(cls, scenario: Scenario, **parameters: Any) -> Self:

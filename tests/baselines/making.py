@@ -25,7 +25,7 @@ SHORT = {"oracle": {"starts": 4, "generations": 1}}
 def made(name, on, **parameters):
     """The policy; where its package is not installed the test is skipped and says so."""
     try:
-        return baselines.make(name, on, **SHORT.get(name, {}), **parameters)
+        return baselines.make(name, on, **SHORT.get(name, {}) | parameters)
     except MissingDependencyError as e:
         assert get(name).rival
         pytest.skip(str(e))

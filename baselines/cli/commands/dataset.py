@@ -9,18 +9,19 @@ from typing import Annotated
 import tyro
 
 from baselines.cli import shell
-from baselines.cli.parsing import if_random
+from baselines.cli.parsing import Count, if_random
+from ikgym.frozen import Frozen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(Frozen):
     """Options of the command."""
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")]
     """A scenario: its name, FILE.toml, or MODULE:ATTRIBUTE."""
     policy: Annotated[str, tyro.conf.arg(metavar="POLICY")]
     """A policy as NAME or NAME:PARAMETER=VALUE,…, agent:PATH for an agent in a file, or MODULE:CLASS."""
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")]
+    episodes: Count
     """Number of episodes, the first seeds of the split. A scenario that is the same at every reset has one."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder of the data set. Minari knows the data set by its name, which ends with a version, such as dls-v0."""

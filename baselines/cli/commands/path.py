@@ -23,7 +23,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
-from ikgym.validation import BoolArray, FloatArray, known_names, number, whole_number
+from ikgym.validation import BoolArray, Bounds, FloatArray, known_names, whole_number
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
@@ -41,7 +41,7 @@ class Options(OwnPath):
     """Times the path as fast as the limits allow, not only as fast as asked."""
     branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Takes the start in this line of the table."""
-    reserve: Annotated[float, tyro.conf.arg(metavar="SHARE")] = RESERVE
+    reserve: Annotated[float, tyro.conf.arg(metavar="SHARE"), Bounds(at_least=0.0, at_most=0.9)] = RESERVE
     """Share of the limits of velocity and acceleration that the motion leaves to the feedback of a real arm."""
     obstacles: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Obstacles of another scenario file, or of a file with nothing else, instead of those of the scenario."""
@@ -67,8 +67,7 @@ def _work(options: Options, _: str) -> None:
         raise InvalidInputError(f"--retime: expected a file that ends in .toml, got {str(options.retime)!r}.")
     if options.retime is not None:
         check_writable_file(options.retime)
-    reserve = number("--reserve", options.reserve, at_least=0.0, at_most=0.9)
-    every = found = survey(_scenario(options), reserve=reserve)
+    every = found = survey(_scenario(options), reserve=options.reserve)
     if options.branch is not None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])

@@ -22,13 +22,14 @@ from baselines.training.options import APG, METHODS, Rewards, TrainingError, pre
 from baselines.workers import Workers
 from ikgym import rl, scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import known_name, number, whole_number
+from ikgym.frozen import Frozen
+from ikgym.validation import Bounds, known_name, whole_number
 
 PROGRAM = "train.py"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(Frozen):
     """Options of runs that do not change their results."""
 
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
@@ -39,7 +40,7 @@ class Options:
     """Continue the runs in the folder; they end with the same weights as without the interruption."""
     overwrite: bool = False
     """Replace the runs in the folder."""
-    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 15.0
+    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS"), Bounds(at_least=0.0)] = 15.0
     """Shortest time between two checkpoints; there are none within a segment."""
     progress: bool = True
     """Show a progress bar."""
@@ -205,7 +206,6 @@ def _train(command: Command, text: str) -> int:
     workers = Workers(options.workers, options.cluster)
     names = ("resume", "overwrite", "checkpoint_every")
     given = {name: getattr(options, name) for name in names} | {"command": text}
-    number("checkpoint_every", options.checkpoint_every, at_least=0.0)
     for line, seed in enumerate(_checked_seeds(options.seeds)):
         folder, bar = options.out / f"seed-{seed}", line if options.progress else None
         jobs.append(Job(config=command.config, seed=seed, folder=folder, options=given, line=bar))

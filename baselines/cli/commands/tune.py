@@ -10,13 +10,17 @@ from typing import Annotated
 import tyro
 
 from baselines.cli import shell
+from baselines.cli.parsing import Count, SeedOption
 from baselines.files import locked, write_json
 from baselines.fingerprints import fingerprint
+from baselines.workers import MOST
 from ikgym import scenarios
+from ikgym.frozen import Frozen
+from ikgym.validation import Bounds
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(Frozen):
     """Options of the command."""
 
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")]
@@ -25,15 +29,15 @@ class Options:
     """Solvers as NAME or NAME:PARAMETER=VALUE,…; if left out, all with ranges that suit the scenario."""
     ranges: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Further ranges, by solver and parameter; they take precedence over those that come with the solvers."""
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 64
+    episodes: Count = 64
     """Episodes of a trial that is not pruned: the first seeds of the validation split."""
-    trials: Annotated[int, tyro.conf.arg(metavar="N")] = 100
+    trials: Count = 100
     """Trials of each solver, pruned ones included."""
-    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    seed: SeedOption = 0
     """Seed of Optuna's sampler."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder for the trials, and for tuned.json."""
-    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    workers: Annotated[int, tyro.conf.arg(metavar="N"), Bounds(at_least=1, at_most=MOST)] = 1
     """Processes that play trials at the same time. With several, the result depends on their order."""
     resume: bool = False
     """Continue with the trials in the folder."""

@@ -20,7 +20,7 @@ from baselines.files import ResultsError, check_writable_file, write
 from baselines.viewer.replay import Replay, Stage, play_all
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.rendering import Renderer
-from ikgym.validation import number, whole_number
+from ikgym.validation import Bounds
 
 #: Most pictures of a video: about an hour.
 MOST_PICTURES = 100_000
@@ -32,12 +32,12 @@ class Options(EpisodeOptions):
 
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="FILE.mp4")]
     """The file to write."""
-    fps: Annotated[float, tyro.conf.arg(metavar="N")] = 30.0
+    fps: Annotated[float, tyro.conf.arg(metavar="N"), Bounds(at_least=0.1, at_most=1000.0)] = 30.0
     """Pictures in one second of the video."""
-    speed: Annotated[float, tyro.conf.arg(metavar="X")] = 1.0
+    speed: Annotated[float, tyro.conf.arg(metavar="X"), Bounds(above=0.0)] = 1.0
     """Seconds of the episode in one second of the video: 0.1 is ten times slower than the arm."""
-    width: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 960
-    """Width of one policy's picture, which is half as high. Several policies stand in two columns."""
+    width: Annotated[int, tyro.conf.arg(metavar="PIXELS"), Bounds(at_least=480, at_most=3840)] = 960
+    """Width of one policy's picture, which is half as high. Several policies are in two columns."""
 
 
 RULES = (if_random("--seed"),)
@@ -61,10 +61,10 @@ def _work(options: Options, _: str) -> None:
         raise MissingDependencyError(f"Videos need the program ffmpeg: {e}") from None
     if options.out.suffix != ".mp4":
         raise InvalidInputError(f"out: expected a file that ends in .mp4, got {str(options.out)!r}.")
-    width, fps = whole_number("width", options.width, at_least=480, at_most=3840), options.fps
+    width, fps = options.width, options.fps
     if width % 4:  # a video has even sizes, and pictures are half as high as wide
         raise InvalidInputError(f"width: expected a multiple of 4 in [px], got {width}.")
-    between = number("speed", options.speed, above=0.0) / number("fps", fps, at_least=0.1, at_most=1000.0)
+    between = options.speed / fps
     stage = Stage.of(options.scenario, options.seed, options.steps)
     last = stage.scenario.steps
     if last * stage.scenario.dt > MOST_PICTURES * between:

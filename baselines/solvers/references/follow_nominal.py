@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
-from ikgym.validation import FloatArray, frozen_array, whole_number
+from ikgym.validation import FloatArray, Seed, frozen_array, whole_number
 
 
 class PrivilegedPath(SolverPolicy, abc.ABC):
@@ -67,13 +67,14 @@ class FollowNominal(PrivilegedPath):
         InvalidInputError: The scenario has no joint path, or is random and there is no seed.
     """
 
-    seed: int | None = None
+    seed: Seed | None = None
     path: FloatArray = dataclasses.field(kw_only=True)
 
     name: ClassVar[str] = "follow_nominal"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "path", frozen_array("path", self.path, (None, self.problem.model.joints)))
+        super().__post_init__()
+        self._settle(path=frozen_array("path", self.path, (None, self.problem.model.joints)))
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
