@@ -59,7 +59,13 @@ def write_json(file: pathlib.Path, value: object) -> None:
     Raises:
         ResultsError: The file cannot be written.
     """
-    write(file, (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+    write(file, json_text(value, indent=1).encode())
+
+
+def json_text(value: object, indent: int | None = None) -> str:
+    """A value as JSON, with a line break at its end; what a terminal cannot show is escaped in it."""
+    text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
+    return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n"
 
 
 def csv_text(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:
@@ -164,20 +170,17 @@ def resumed(
     Raises:
         ResultsError: There is work and neither flag is given, or it is other work, or the manifest is damaged.
     """
-    check_flags(manifest, resume=resume, overwrite=overwrite)
-    if overwrite or not manifest.exists():
+    if not check_flags(manifest, resume=resume, overwrite=overwrite):
         return None
     there = read_json(manifest)
     if not isinstance(there, dict):
         raise ResultsError(f"{manifest} is damaged: expected an object, got {type(there).__name__}.")
-    if names := [name for name in about if there.get(name) != about[name]]:
-        changes = ", ".join(f"{name} ({there.get(name)!r} there, {about[name]!r} here)" for name in names)
-        raise ResultsError(f"{manifest} differs in {changes}: resume with the same, or choose another folder.")
+    check_same(manifest, there, about)
     return there
 
 
-def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> None:
-    """Refuses to replace a file unless a flag says so.
+def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> bool:
+    """Checks the flags of a command; returns whether the work in a file is continued.
 
     Raises:
         ResultsError: Both flags are given, or neither and the file exists.
@@ -188,6 +191,18 @@ def check_flags(file: pathlib.Path, *, resume: bool, overwrite: bool) -> None:
         raise ResultsError(
             f"{file} already exists: continue with --resume, replace it with --overwrite, or choose another folder."
         )
+    return resume and file.exists()
+
+
+def check_same(file: pathlib.Path, there: Mapping[str, Any], here: Mapping[str, Any], of: str = "") -> None:
+    """Refuses to continue work in a file with other values than those here.
+
+    Raises:
+        ResultsError: A value differs.
+    """
+    if names := [name for name in here if there.get(name) != here[name]]:
+        changes = ", ".join(f"{name} ({there.get(name)!r} there, {here[name]!r} here)" for name in names)
+        raise ResultsError(f"{file} differs in {changes}{of}: resume with the same, or choose another folder.")
 
 
 def check_writable(folder: pathlib.Path) -> None:

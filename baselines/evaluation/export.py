@@ -57,19 +57,17 @@ FORMATS: Mapping[str, Format] = {
 }
 
 
-def formats(names: str | Iterable[str]) -> tuple[str, ...]:
-    """The names of formats, each once.
+def check_formats(names: Iterable[str]) -> None:
+    """Refuses formats that do not exist, and those whose package is not installed.
 
     Raises:
         UnknownNameError: There is no format of a name.
         MissingDependencyError: The package of a format is not installed.
     """
-    given = (names,) if isinstance(names, str) else tuple(names)
-    known_names("format of export", given, tuple(FORMATS))
-    for name in given:
+    known_names("format of export", names, tuple(FORMATS))
+    for name in names:
         if (package := FORMATS[name].package) and importlib.util.find_spec(package) is None:
             raise MissingDependencyError(f'Format {name!r} needs {package}: pip install "ikgym[paths]"')
-    return tuple(dict.fromkeys(given))
 
 
 def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> TrajectoryLog:

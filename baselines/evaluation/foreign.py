@@ -18,7 +18,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
-from ikgym.spaces import action_space, observation_space
 from ikgym.validation import FloatArray
 
 #: Wraps the environment, as an agent needs it that was trained in a wrapped one.
@@ -76,30 +75,25 @@ class ForeignPolicy:
 
     def misfit(self, scenario: Scenario) -> str | None:
         """Why the spaces of the model do not fit a scenario; None if they do, or if it has none."""
-        shown: gym.Space[Any]
-        needed: gym.Space[Any]
-        if self.wrap is None:
-            shown, needed = observation_space(scenario, self.preview), action_space(scenario)
-        else:
-            env = self.environment(scenario)
-            shown, needed = env.observation_space, env.action_space
-        for kind, own, there in (
-            ("observations", getattr(self.model, "observation_space", None), shown),
-            ("actions", getattr(self.model, "action_space", None), needed),
+        env = self.environment(scenario)
+        shown, needed = env.observation_space, env.action_space
+        for kind, attribute, there in (
+            ("observations", "observation_space", shown),
+            ("actions", "action_space", needed),
         ):
-            if isinstance(own, gym.Space) and _shapes(own) != _shapes(there):
-                return f"{self.name} has {kind} of the shape {_shapes(own)}, the environment of {_shapes(there)}."
+            space = getattr(self.model, attribute, None)
+            if isinstance(space, gym.Space) and _shapes(space) != _shapes(there):
+                return f"{self.name} has {kind} of the shape {_shapes(space)}, the environment of {_shapes(there)}."
         return None
 
     def environment(self, scenario: Scenario) -> gym.Env[Any, Any]:
         """The environment in its wrappers."""
-        assert self.wrap is not None
-        made = gym.make("RedundantIK-v0", scenario=scenario, preview=self.preview, disable_env_checker=True)
+        bare = gym.make("RedundantIK-v0", scenario=scenario, preview=self.preview, disable_env_checker=True)
         try:
-            env = self.wrap(made)
+            env = self.wrap(bare) if self.wrap else bare
         except Exception as e:  # whatever the user's code raises
             raise InvalidInputError(f"wrap: raised {type(e).__name__} on {scenario.name}: {e}.") from e
-        if not isinstance(env, gym.Env) or env.unwrapped is not made.unwrapped:
+        if not isinstance(env, gym.Env) or env.unwrapped is not bare.unwrapped:
             raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
         return env
 
@@ -119,16 +113,16 @@ class WrappedEnvironment:
         InvalidInputError: The episode has other seeds; a wrapper raises, or changes the episode.
     """
 
-    def __init__(self, policy: ForeignPolicy, scenario: Scenario, seeds: Sequence[int | Seeds], **options: Any) -> None:
+    def __init__(self, policy: Any, scenario: Scenario, seeds: Sequence[int | Seeds], **options: Any) -> None:
         self._seeds = Seeds.of(seeds[0])
         if self._seeds != Seeds(self._seeds.seed):
             raise InvalidInputError(
                 f"wrap: expected an episode that has no seed but the reset seed, got {self._seeds}; sequences of "
                 "episodes are played without wrappers."
             )
-        self._scenario, self._made = scenario, 0
+        self._scenario, self._steps = scenario, 0
         self._env: gym.Env[Any, Any] = policy.environment(scenario)
-        self._arm: Simulator = self._env.unwrapped.simulator  # type: ignore[attr-defined]
+        self._arm: Simulator = self._env.unwrapped.simulator
         self.seen, _ = self._env.reset(seed=self._seeds.seed)
         start = Simulation(scenario, seeds, preview=1, single=True).true_q
         self._check(self._env.np_random_seed == self._seeds.seed and np.array_equal(self._arm.true_q, start))
@@ -136,11 +130,11 @@ class WrappedEnvironment:
     def step(self, action: npt.NDArray[Any]) -> Outcome:
         """Makes one step."""
         self.seen, _, terminated, truncated, _ = self._env.step(action)
-        self._made, out = self._made + 1, self._arm.outcome
-        self._check(int(out.remaining[0, 0]) == self._scenario.steps - self._made)
-        if (terminated or truncated) and self._made < self._scenario.steps:
+        self._steps, out = self._steps + 1, self._arm.outcome
+        self._check(int(out.remaining[0, 0]) == self._scenario.steps - self._steps)
+        if (terminated or truncated) and self._steps < self._scenario.steps:
             raise InvalidInputError(
-                f"wrap: the episode of {self._scenario.name} ended after {self._made} of {self._scenario.steps} steps."
+                f"wrap: the episode of {self._scenario.name} ended after {self._steps} of {self._scenario.steps} steps."
             )
         return out
 

@@ -6,16 +6,23 @@ import dataclasses
 import itertools
 import pathlib
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import tyro
 
-from baselines.evaluation import metrics, test_sets
-from baselines.evaluation.export import formats
-from baselines.evaluation.foreign import Wrap
-from baselines.evaluation.policies import ALL, specifications
-from baselines.evaluation.specification import Specification, shown_preview
+from baselines.canonical import canonical
+from baselines.evaluation import test_sets
+from baselines.evaluation.metrics import Key, Skipped
+from baselines.evaluation.policies import (
+    ALL,
+    AnyPolicy,
+    Specification,
+    UnsuitedError,
+    shown_preview,
+    specification,
+    specifications,
+)
 from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
@@ -56,7 +63,7 @@ class Options:
     preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
     """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
     policy's own preview if left out."""
-    wrap: Annotated[Wrap | None, tyro.conf.Fixed, tyro.conf.Suppress] = None
+    wrap: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
     trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
     timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 1
@@ -97,12 +104,15 @@ class Options:
     def __post_init__(self) -> None:
         for name in ("test_sets", "export", "severities"):
             value = getattr(self, name)
-            object.__setattr__(self, name, (value,) if isinstance(value, (str, float)) else tuple(value))
-        object.__setattr__(self, "export", formats(self.export))
+            object.__setattr__(self, name, (value,) if isinstance(value, (str, float)) else tuple(dict.fromkeys(value)))
         if self.out is not None:
             object.__setattr__(self, "out", pathlib.Path(self.out))
-        elif self.export:
-            raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
+        if self.export:
+            from baselines.evaluation.export import check_formats
+
+            check_formats(self.export)
+            if self.out is None:
+                raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
         whole_number("episodes", self.episodes, at_least=1)
         whole_number("noise_seeds", self.noise_seeds, at_least=1, at_most=10_000)
         if self.steps is not None:
@@ -120,11 +130,11 @@ class Job:
 
     scenario: Scenario
     specification: Specification  # the policy, not yet bound to the scenario
-    parameters: Mapping[str, Any]  # all of its parameters, as rows state them
-    seeds: Seeds
+    parameters: Mapping[str, Any]  # parameters of the bound policy, as rows have them
+    seeds: Seeds  # the random seeds of the episode
     first: bool  # whether it is the first episode of its policy in its scenario; its trajectory log is kept
     record: bool  # whether the record of the episode is needed, for the log or for an export
-    timed: bool  # whether it is played by itself and timed
+    timed: bool  # whether it is played alone and timed
     preview: Preview  # steps ahead that the policy is shown, or which ones
     test_set: str | None = None  # digest of the test set of the episode; None if it belongs to none
     # number of episodes that the same arm plays before, with reset seeds that end at this one's; the policy keeps
@@ -147,25 +157,17 @@ class Job:
         return fingerprint(self.scenario)
 
     @property
-    def key(self) -> metrics.Key:
+    def key(self) -> Key:
         """The key of the row to come."""
-        return metrics.key(self.scenario.name, self.policy, self.parameters, self.seeds, self.scenario.steps)
+        return self.scenario.name, self.policy, canonical(self.parameters), self.seeds, self.scenario.steps
 
     def bind(self) -> Policy:
         """The policy; refused if the file behind it has changed since the evaluation began."""
-        policy = self.specification.bind(self.scenario, self.given, self.preview)
+        policy = self.specification.bind(self.scenario, self.seeds, self.preview)
         now = self.specification.parameters(self.scenario, policy)
         if now != self.parameters:
             raise ResultsError(f"{self.policy} has changed since the evaluation began: {self.parameters} is now {now}.")
         return policy
-
-
-class Skipped(NamedTuple):
-    """A policy that does not suit a scenario."""
-
-    scenario: str
-    policy: str
-    reason: str  # why it does not suit
 
 
 def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
@@ -178,99 +180,101 @@ def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
         ResultsError: The file of an agent cannot be used.
     """
     timed = sys.maxsize if options.timed == ALL else int(options.timed)
-    all_policies = specifications(options.policies, wrap=options.wrap)
-    played = _episodes(options)
-    jobs: dict[metrics.Key, Job] = {}
+    policies = specifications(options.policies, wrap=options.wrap)
+    jobs: dict[Key, Job] = {}
     skipped: list[Skipped] = []
-    for some in _with_ideal(played) if options.pairs else played:
-        scenario = some.scenario
-        for one in all_policies:
-            if reason := one.unsuited(scenario, some.seeds[0], options.preview):
-                skipped.append(Skipped(scenario.name, one.name, reason))
-                continue
-            policy = one.bind(scenario, one.given(scenario, some.seeds[0]), options.preview)
-            parameters, shown = one.parameters(scenario, policy), shown_preview(policy, options.preview)
-            per_episode = one.per_episode(scenario)
-            for number, seeds in enumerate(some.seeds):
-                job = Job(
-                    scenario=scenario,
-                    specification=one,
-                    parameters=parameters,
-                    seeds=seeds,
-                    first=number == 0,
-                    record=number == 0 or bool(options.export),
-                    timed=number < timed,
-                    preview=shown,
-                    test_set=some.test_set,
-                    # A reference is bound to one episode, and has nothing to learn from those before.
-                    before=0 if per_episode or seeds.arm_seed is None else seeds.seed - seeds.arm_seed * some.length,
-                )
-                jobs.setdefault(job.key, job)
+    for (scenario, seeds, test_set, length), one in itertools.product(_episodes(options), policies):
+        try:
+            policy = one.bind(scenario, seeds[0], options.preview)
+        except UnsuitedError as e:
+            skipped.append(Skipped(scenario.name, one.name, str(e)))
+            continue
+        parameters, shown = one.parameters(scenario, policy), shown_preview(policy, options.preview)
+        per_episode = one.per_episode(scenario)
+        for number, draw in enumerate(seeds):
+            job = Job(
+                scenario=scenario,
+                specification=one,
+                parameters=parameters,
+                seeds=draw,
+                first=number == 0,
+                record=number == 0 or bool(options.export),
+                timed=number < timed,
+                preview=shown,
+                test_set=test_set,
+                # A reference is bound to one episode, and has nothing to learn from those before.
+                before=0 if per_episode or draw.arm_seed is None else draw.seed - draw.arm_seed * length,
+            )
+            jobs.setdefault(job.key, job)
     if not jobs:
         reasons = "; ".join(f"{one.policy} in {one.scenario}: {one.reason}" for one in skipped)
         raise InvalidInputError(f"Nothing to evaluate: {reasons or 'no scenario or no policy given.'}")
     return list(jobs.values()), skipped
 
 
-class _Episodes(NamedTuple):
-    """Episodes of a scenario: seeds of each, digest of their test set, and how many one arm plays in a row."""
+def job_of(policy: AnyPolicy, scenario: Scenario, seed: int, preview: Preview | None = None, wrap: Any = None) -> Job:
+    """The job of one policy in one episode, which is timed and recorded.
 
-    scenario: Scenario
-    seeds: tuple[Seeds, ...]
-    test_set: str | None = None
-    length: int = 1
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The policy does not suit the scenario, or is shown too little.
+    """
+    one, seeds = specification(policy, wrap=wrap), Seeds(seed)
+    try:
+        bound = one.bind(scenario, seeds, preview)
+    except UnsuitedError as e:
+        raise InvalidInputError(f"{one.name} does not suit {scenario.name}: {e}") from e
+    parameters, shown = one.parameters(scenario, bound), shown_preview(bound, preview)
+    return Job(scenario, one, parameters, seeds, first=True, record=True, timed=True, preview=shown)
 
 
-def _drawn(
-    scenario: Scenario, seeds: Iterable[int], noise_seeds: int, test_set: str | None = None, length: int = 1
-) -> _Episodes:
-    """The episodes of reset seeds; each is played once if there is no noise."""
-    times = noise_seeds if scenario.plant.noisy else 1
-    every = (Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
-    return _Episodes(scenario, tuple(every), test_set, length)
+#: Episodes of a scenario: seeds of each, digest of their test set, and how many one arm plays in a row.
+_Episodes = tuple[Scenario, tuple[Seeds, ...], str | None, int]
 
 
 def _episodes(options: Options) -> list[_Episodes]:
-    """The episodes of all scenarios or test sets."""
-    listed = _scenarios(options)
+    """The episodes of all scenarios or test sets, and with `pairs` those on ideal plants with the same seeds."""
+    scenarios = _scenarios(options)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
-        if listed or changed or options.severities:
+        if scenarios or changed or options.severities:
             raise InvalidInputError(
                 f"A test set defines the episodes: with {', '.join(map(repr, options.test_sets))}, expected no "
                 "scenarios, episodes, split, steps, noise_seeds or severities."
             )
         sets = [test_sets.get(name) for name in options.test_sets]
-        return [_drawn(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
-    reset = scenario_registry.seeds(options.split, options.episodes)
-    return [
-        _drawn(
-            scenario,
-            # A scenario that is the same at every reset is played once.
-            reset if scenario.random or scenario.plant.random else (0,),
-            options.noise_seeds,
-            length=test_sets.sequence(scenario.name),
-        )
-        for scenario in listed
-    ]
+        out = [_draw(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
+    else:
+        # A scenario that is the same at every reset is played once.
+        several = scenario_registry.seeds(options.split, options.episodes)
+        seeds = [several if one.random or one.plant.random else (0,) for one in scenarios]
+        out = [
+            _draw(one, some, options.noise_seeds, length=test_sets.sequence(one.name))
+            for one, some in zip(scenarios, seeds, strict=True)
+        ]
+    if options.pairs:
+        known, names = {fingerprint(scenario) for scenario, *_ in out}, dict[str, str]()
+        for scenario, seeds_of, *_ in list(out):
+            plain = ideal(scenario)
+            if (content := fingerprint(plain)) not in known:
+                name = names.setdefault(content, f"{scenario.name}, ideal plant")
+                out.append(_draw(plain.replace(name=name), dict.fromkeys(one.seed for one in seeds_of)))
+    return out
 
 
-def _with_ideal(played: Sequence[_Episodes]) -> Iterator[_Episodes]:
-    """The episodes, and those with an ideal plant on the same seeds, unless that scenario is played anyway."""
-    yield from played
-    there = {fingerprint(one.scenario) for one in played}
-    names: dict[str, str] = {}
-    for one in played:
-        plain = ideal(one.scenario)
-        if (content := fingerprint(plain)) not in there:
-            name = names.setdefault(content, f"{one.scenario.name}, ideal plant")
-            yield _drawn(plain.replace(name=name), dict.fromkeys(seeds.seed for seeds in one.seeds), 1)
+def _draw(
+    scenario: Scenario, seeds: Iterable[int], noise_seeds: int = 1, test_set: str | None = None, length: int = 1
+) -> _Episodes:
+    """The episodes of reset seeds; each is played once if there is no noise."""
+    times = noise_seeds if scenario.plant.noisy else 1
+    every = (Seeds(seed, seed // length if length > 1 else None, noise) for seed in seeds for noise in range(times))
+    return scenario, tuple(every), test_set, length
 
 
 def _scenarios(options: Options) -> list[Scenario]:
     """The scenarios of an evaluation, each once, at all severities."""
-    given, out = options.scenarios, dict[str, Scenario]()
-    for item in (given,) if isinstance(given, (str, Scenario)) else given:
+    items, out = options.scenarios, dict[str, Scenario]()
+    for item in (items,) if isinstance(items, (str, Scenario)) else items:
         names = scenario_registry.names() if isinstance(item, str) and item == ALL else (item,)
         for scenario in map(scenario_registry.find, names):
             known = out.setdefault(scenario.name, scenario)
@@ -279,17 +283,17 @@ def _scenarios(options: Options) -> list[Scenario]:
                     f"Two different scenarios are called {scenario.name!r}: rename one with "
                     "scenario.replace(name=…), so that their results can be distinguished."
                 )
-    found = list(out.values())
+    scenarios = list(out.values())
     if options.severities:
-        if len(found) != 1 or found[0].plant.ideal:
+        if len(scenarios) != 1 or scenarios[0].plant.ideal:
             raise InvalidInputError(
                 "severities: expected one scenario whose plant is not ideal, got "
-                f"{', '.join(repr(one.name) for one in found) or 'none'}."
+                f"{', '.join(map(repr, out)) or 'none'}."
             )
-        found = at_severities(found[0], options.severities)
+        scenarios = at_severities(scenarios[0], options.severities)
     if options.steps is None:
-        return found
-    return [scenario.replace(steps=min(options.steps, scenario.steps)) for scenario in found]
+        return scenarios
+    return [scenario.replace(steps=min(options.steps, scenario.steps)) for scenario in scenarios]
 
 
 def at_severities(scenario: Scenario, severities: Sequence[float]) -> list[Scenario]:

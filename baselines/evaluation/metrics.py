@@ -8,16 +8,14 @@ import functools
 import math
 import pathlib
 import platform
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numba
 import numpy as np
 
 import ikgym
 from baselines.canonical import canonical
-from baselines.evaluation.motion.contacts import contacts
-from baselines.evaluation.motion.free_timing import first_steps, path_scores
 from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
@@ -25,6 +23,9 @@ from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.kernels.threads import count_cores
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Identifies an episode of an evaluation: scenario, policy, its parameters as text, seeds, steps.
 Key = tuple[str, str, str, Seeds, int]
@@ -150,11 +151,12 @@ class Row:
     def key(self) -> Key:
         """Identifies the episode within an evaluation."""
         seeds = Seeds(self.seed, self.arm_seed, self.noise_seed)
-        return key(self.scenario, self.policy, self.parameters, seeds, self.steps)
+        return self.scenario, self.policy, canonical(self.parameters), seeds, self.steps
 
     def to_json(self) -> dict[str, Any]:
         """The row as JSON has it: numbers that are not finite are null."""
-        return {field.name: _finite_or_none(getattr(self, field.name)) for field in dataclasses.fields(self)}
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in values.items()}
 
     @classmethod
     def nan_restored(cls, values: Any) -> Any:
@@ -163,6 +165,35 @@ class Row:
             return values
         numbers = {field.name for field in dataclasses.fields(cls) if field.type == "float"}
         return {name: math.nan if value is None and name in numbers else value for name, value in values.items()}
+
+
+class Skipped(NamedTuple):
+    """A policy that does not suit a scenario, or a motion that no controller would accept."""
+
+    scenario: str
+    policy: str
+    reason: str
+
+
+class Rows(list[Row]):
+    """The rows of an evaluation.
+
+    Attributes:
+        skipped: Policies that do not suit a scenario and motions that no controller would accept, with the reasons.
+    """
+
+    def __init__(self, rows: Iterable[Row] = (), skipped: Sequence[Skipped] = ()) -> None:
+        super().__init__(rows)
+        self.skipped = tuple(skipped)
+
+    def frame(self) -> pd.DataFrame:
+        """The rows as a data frame of pandas: one line an episode with the fields of a row and `lost`; NaN for None."""
+        import pandas as pd  # slow to import
+
+        fields = dataclasses.fields(Row)
+        numbers = [field.name for field in fields if str(field.type).startswith(("float", "int | None"))]
+        out = pd.DataFrame([vars(row) for row in self], columns=[field.name for field in fields])
+        return out.astype(dict.fromkeys(numbers, float)).assign(lost=[row.lost for row in self])
 
 
 def lost(position_error: float, orientation_error: float | None) -> bool:
@@ -180,11 +211,6 @@ def _within(distance: float, angle: float, position_error: float, orientation_er
     return position_error <= distance and (orientation_error is None or orientation_error <= angle)
 
 
-def key(scenario: str, policy: str, parameters: Mapping[str, Any], seeds: Seeds, steps: int) -> Key:
-    """Identifies an episode of an evaluation."""
-    return scenario, policy, canonical(parameters), seeds, steps
-
-
 def measure(
     scenario: Scenario,
     policy: str,
@@ -200,8 +226,11 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
-    along_path: dict[str, Any] = path_scores(scenario, seeds, episode)
-    episode = first_steps(episode, scenario.steps)
+    along_path: dict[str, Any] = {}
+    if "progress" in episode.diagnostics:
+        from baselines.evaluation.motion.free_timing import first_steps, path_scores
+
+        along_path, episode = path_scores(scenario, seeds, episode), first_steps(episode, scenario.steps)
     total = float(add_up(episode.cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]
@@ -252,8 +281,24 @@ def measure(
         ideal=ideal,
         acceleration_stated=bool(np.isfinite(scenario.arm.acceleration_limit).all()) or not scenario.arm.limited,
         **along_path,
-        **contacts(scenario, episode),
+        **_contacts(scenario, episode),
     )
+
+
+def _contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
+    """Clearance, closest pair, stop and Φ^C; empty where nothing can meet."""
+    if episode.clearance is None or episode.pair is None or episode.stopped is None or episode.pair[0, 0] < 0:
+        return {}
+    stops = np.flatnonzero(episode.stopped)
+    until = episode.clearance[: stops[0] + 1] if len(stops) else episode.clearance
+    step = int(stops[0] if len(stops) else until.argmin())
+    return {
+        "clearance_min": float(until.min()),
+        "closest_pair": list(scenario.pair_names(episode.pair[step].astype(np.int64).tolist())),
+        "closest_step": step + 1,
+        "stopped": step + 1 if len(stops) else None,
+        "proximity_cost": None if episode.proximity_cost is None else float(add_up(episode.proximity_cost)),
+    }
 
 
 def _rms(values: FloatArray) -> float:
@@ -265,10 +310,6 @@ def _margin(arm: Arm, q: FloatArray) -> float | None:
     if not np.isfinite([arm.lower, arm.upper]).any():
         return None
     return float(min((q - arm.lower).min(), (arm.upper - q).min()))
-
-
-def _finite_or_none(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @functools.cache

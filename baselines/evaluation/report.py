@@ -12,9 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from baselines.evaluation.columns import BESIDE_IDEAL, FOLLOWED_NOTE, POLICIES, SPREAD, columns
-from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION
+from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Skipped
+from baselines.evaluation.summary import BESIDE_IDEAL, FOLLOWED_NOTE, POLICIES, SPREAD, columns, escape_names
 from baselines.evaluation.table import NOTHING, plain
 from baselines.oracle import best_known
 from ikgym.exceptions import printable
@@ -60,7 +59,7 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
         skipped: Policies that were skipped.
         width: Characters of a line.
     """
-    lines = _printable(lines)
+    lines = escape_names(lines)
     parts: list[str] = []
     absent: dict[str, None] = {}
     for scenario, every in lines.groupby("scenario", sort=False):
@@ -79,13 +78,13 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
-def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
+def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> bytes:
     """The README of a folder of results: tables, parameters and conditions as one block of text in Markdown."""
-    conditions = [f"command: {printable(command)}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
+    conditions = [f"command: {command}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
     text = "\n\n".join([table(lines, skipped, width=WIDE), *map("\n".join, (parameters(lines), conditions))])
     text = printable(text, "\n")
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
-    return f"# Results\n\n{fence}text\n{text}\n{fence}\n"
+    return f"# Results\n\n{fence}text\n{text}\n{fence}\n".encode()
 
 
 def heading(lines: pd.DataFrame) -> str:
@@ -137,11 +136,6 @@ def machines(lines: pd.DataFrame) -> list[str]:
     found = list(dict.fromkeys(itertools.chain(*lines.machines)))
     warning = ["The rows were measured on different machines: their times cannot be compared."]
     return [f"machine: {_machine(json.loads(one))}" for one in found] + warning * (len(found) > 1)
-
-
-def _printable(lines: pd.DataFrame) -> pd.DataFrame:
-    """Lines whose names can be printed: a line break in one would begin a line of the table."""
-    return lines.assign(**{key: lines[key].map(printable) for key in ("scenario", "policy", "label")})
 
 
 def _machine(machine: dict[str, Any]) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import collections
 import dataclasses
 import json
+import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,31 +15,140 @@ import pandas as pd
 
 from baselines import registry
 from baselines.canonical import canonical, jsonable
-from baselines.evaluation.columns import COLUMNS, geometric
-from baselines.evaluation.metrics import Row
+from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, Row, Rows
+from baselines.evaluation.table import NOTHING, Column, count, interval, number
 from baselines.oracle import best_known
 from baselines.spec import parse_policy
 from baselines.statistics import geometric_interval, geometric_mean
-from ikgym.exceptions import IkgymError, InvalidInputError
+from baselines.status import Status
+from ikgym.exceptions import IkgymError, InvalidInputError, printable
 
 #: The quantities by which the episodes of a scenario are compared.
 RATIO, TOTAL = "cost ratio", "total cost"
 #: Cost ratios where best known costs are missing: relative to the lowest cost in the table.
 LOWEST = "lowest in the table"
 BEST_KNOWN = "best known"
-#: Columns of rows that are numbers or None.
-_NUMBERS = [field.name for field in dataclasses.fields(Row) if str(field.type).startswith(("float", "int | None"))]
 #: What identifies a policy with its parameters, and a line of a table.
 _POLICY = ["policy", "text", "steps"]
 _LINE = ["scenario", "label", "text", "steps"]
 
+# Columns
 
-def frame(rows: Iterable[Row]) -> pd.DataFrame:
-    """One line an episode: the columns of :class:`baselines.evaluation.metrics.Row` and `lost`; NaN for None."""
-    rows = list(rows)
-    columns = [field.name for field in dataclasses.fields(Row)]
-    out = pd.DataFrame([vars(row) for row in rows], columns=columns).astype(dict.fromkeys(_NUMBERS, float))
-    return out.assign(lost=[row.lost for row in rows])
+
+def _mark(line: Any) -> str:
+    """The policy with its marks, see the notes of :mod:`baselines.evaluation.report`."""
+    marks = {" *": line.reference, " †": line.steps_at_joint_limit, " ‡": line.free_timing}
+    return str(line.label) + "".join(mark for mark, applies in marks.items() if applies)
+
+
+def _mark_unstated(line: Any) -> str:
+    return number(line.qddot_peak) + " §" * (not line.stated)
+
+
+def _count_followed(line: Any) -> str:
+    return f"{line.followed} of {line.rows}" if line.rows > 1 else "yes" if line.followed else "no"
+
+
+def _geometric(values: pd.Series) -> float:
+    """The geometric mean; NaN if a value is missing."""
+    return geometric_mean(values) if values.notna().all() else math.nan
+
+
+def _total(values: pd.Series) -> float:
+    """The sum; NaN if all values are missing."""
+    return float(values.sum(min_count=1))
+
+
+def _largest(values: pd.Series) -> float:
+    """The largest value; NaN if one is NaN, as that of an arm that diverged."""
+    return float(values.max(skipna=False))
+
+
+def _largest_in_thousandths(values: pd.Series) -> float:
+    return 1e3 * _largest(values)
+
+
+def _worst_status(statuses: pd.Series) -> str:
+    return str(max(statuses, key=lambda status: Status[status.upper()]))
+
+
+def _columns() -> Iterable[Column]:
+    of_episodes = "geometric mean over the episodes"
+    yield Column("label", "policy", format=str, text=_mark)
+    yield Column("total_cost", "total", "cost", of_episodes, how=_geometric)
+    yield Column("tracking_cost", "tracking", "cost", how=_geometric, drop=4)
+    yield Column("cost_ratio", "cost", "ratio", f"total cost / best known cost, {of_episodes}", how=_geometric)
+    about = "largest position error"
+    yield Column("position_error_mm", "pos max", "[mm]", about, of="position_error_max", how=_largest_in_thousandths)
+    at, most = "orientation_error_max", _largest_in_thousandths
+    yield Column("orientation_error_mrad", "ori max", "[mrad]", "largest orientation error", of=at, how=most, drop=1)
+    yield Column("qdot_peak", "q̇ peak", "", "largest joint velocity, in rad/s or m/s", drop=2, how=_largest)
+    about = "largest joint acceleration, in rad/s² or m/s²; § no limit stated"
+    yield Column("qddot_peak", "q̈ peak", "", about, drop=3, text=_mark_unstated, how=_largest)
+    about = "steps with a joint at"
+    yield Column("steps_at_joint_limit", "at stop", "", f"{about} a stop", how="sum", format=count)
+    yield Column("steps_at_velocity_limit", "at q̇ limit", "", f"{about} its velocity limit", how="sum", format=count)
+    limit = f"{about} its acceleration limit"
+    yield Column("steps_at_acceleration_limit", "at q̈ limit", "", limit, how="sum", format=count)
+    about = "when the end of the path was reached, with free timing"
+    yield Column("path_time_s", "path time", "[s]", about, of="path_time", how=_largest)
+    about = "largest distance from the reference at the policy's own progress, with free timing"
+    yield Column("path_error_mm", "path err", "[mm]", about, of="path_position_error", how=_largest_in_thousandths)
+    smallest: Callable[[pd.Series], float] = lambda values: 1e3 * values.min()  # noqa: E731
+    yield Column(
+        "clearance_mm", "clearance", "[mm]", "smallest distance between bodies", of="clearance_min", how=smallest
+    )
+    yield Column("stopped", "stopped", "", "episodes in which bodies would have met", how=_total, format=count)
+    yield Column("time_p50_us", "p50", "[µs]", "median time of a call after the first", how="median")
+    yield Column("time_p99_us", "p99", "[µs]", "99th percentile of these times", how="max", drop=5)
+    yield Column("deadline_misses", "misses", "", "such calls longer than Δt", how=_total, format=count, drop=6)
+    about = "number of episodes; more than one of a random scenario"
+    yield Column("episodes", "episodes", "", about, of="seed", how="nunique", format=count)
+    yield Column("mean", "geometric mean")
+    yield Column("median", "median")
+    yield Column("p90", "p90")
+    yield Column("worst", "worst")
+    yield Column("worst_seed", "worst seed", format=count)
+    yield Column("lost", "lost", "", "episodes in which the arm was lost", how="sum", format=count)
+    yield Column("followed", "followed", "", FOLLOWED_NOTE.partition(";")[0], how="sum", text=_count_followed)
+    about = "the worst that the solver reported in any step"
+    yield Column("solver_status", "solver", "status", about, how=_worst_status, format=str)
+    yield Column("ideal_cost_ratio", "ideal", "ratio")
+    yield Column("times_ideal", "× ideal", "cost")
+    yield Column("times_ideal_low", "95 %", text=lambda line: interval(line.times_ideal_low, line.times_ideal_high))
+    about = "interval of the mean cost ratio over the episodes"
+    yield Column("ratio_low", "95 %", "", about, text=lambda line: interval(line.ratio_low, line.high))
+    yield Column("ratio_worst", "worst", "", "largest cost ratio of an episode")
+
+
+FOLLOWED_NOTE = (
+    f"followed: at most {1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad of error in all steps; "
+    "solver status: the worst that the solver reported"
+)
+#: All columns of terminal and report, by name.
+COLUMNS: Mapping[str, Column] = {one.key: one for one in _columns()}
+
+
+def columns(keys: Iterable[str], lines: pd.DataFrame) -> list[Column]:
+    """The columns of these names that have a value in some line."""
+    chosen = (COLUMNS[key] for key in keys)
+    return [column for column in chosen if any(cell != NOTHING for cell in column.cells(lines))]
+
+
+ERRORS = ("position_error_mm", "orientation_error_mrad", "qdot_peak", "qddot_peak")
+WHERE = ("path_time_s", "path_error_mm", "clearance_mm", "stopped")
+TIMES = ("time_p50_us", "time_p99_us", "deadline_misses")
+#: The table of all policies; of several episodes; of the comparison with ideal plants; and of the report.
+POLICIES = ("label", "total_cost", "tracking_cost", "cost_ratio", *ERRORS, *WHERE, *TIMES, "followed", "solver_status")
+SPREAD = ("episodes", "mean", "median", "p90", "worst", "worst_seed", "lost")
+BESIDE_IDEAL = ("ideal_cost_ratio", "times_ideal", "times_ideal_low")
+AT_LIMITS = tuple(f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))
+REPORT = (
+    *("cost_ratio", "ratio_low", "ratio_worst", "total_cost", "followed", "lost", "episodes", *TIMES, *ERRORS, *WHERE),
+    *(*AT_LIMITS, "solver_status"),
+)
+
+# Lines
 
 
 def summarise(rows: Iterable[Row]) -> pd.DataFrame:
@@ -54,7 +164,7 @@ def summarise(rows: Iterable[Row]) -> pd.DataFrame:
     Raises:
         InvalidInputError: Two scenarios share a name, or rows belong to different test sets.
     """
-    episodes = _labelled(rows)
+    episodes = _label_episodes(rows)
     known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
     episodes["value"] = episodes.cost_ratio.where(known, episodes.total_cost)
     lines = _lines(episodes, _LINE)
@@ -63,6 +173,11 @@ def summarise(rows: Iterable[Row]) -> pd.DataFrame:
     lines["quantity"] = np.where(all_known, RATIO, TOTAL)
     lines = lines.assign(ratio_low=lines.low.where(all_known), ratio_worst=lines.worst.where(all_known))
     return lines.merge(_beside_ideal(episodes), how="left", on=_LINE)
+
+
+def escape_names(lines: pd.DataFrame) -> pd.DataFrame:
+    """Lines whose names can be shown: control characters and line breaks are escape sequences."""
+    return lines.assign(**{key: lines[key].map(printable) for key in ("scenario", "policy", "label")})
 
 
 def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
@@ -79,9 +194,9 @@ def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
     Raises:
         InvalidInputError: The training seeds of an agent have played different episodes.
     """
-    episodes = _labelled(rows)
-    given = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
-    episodes["label"] = [_label(line, given) or line.label for line in episodes.itertuples()]
+    episodes = _label_episodes(rows)
+    texts = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
+    episodes["label"] = [_label(line, texts) or line.label for line in episodes.itertuples()]
     known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
     # Costs too small for a ratio count as the smallest allowed.
     lowest = episodes.groupby(["scenario", "seed"]).total_cost.transform("min").clip(lower=best_known.MEANINGLESS)
@@ -95,10 +210,10 @@ def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
     ).reset_index(drop=True)
 
 
-def _labelled(rows: Iterable[Row]) -> pd.DataFrame:
+def _label_episodes(rows: Iterable[Row]) -> pd.DataFrame:
     """The frame of rows; also the parameters as `text`, a `label` for the policy, and seeds that beat a record."""
-    rows = list(rows)
-    out = frame(rows).assign(
+    rows = Rows(rows)
+    out = rows.frame().assign(
         text=[canonical(row.parameters) for row in rows],
         beaten=[row.seed if best_known.beaten(row) else np.nan for row in rows],
         stopped=[np.nan if row.clearance_min is None else float(row.stopped is not None) for row in rows],
@@ -179,7 +294,7 @@ def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
         episodes.groupby(keys, sort=False, dropna=False)
         .agg(
             cost=("total_cost", geometric_mean),
-            ideal_ratio=("cost_ratio", geometric),
+            ideal_ratio=("cost_ratio", _geometric),
         )
         .reset_index()
     )
@@ -193,7 +308,7 @@ def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
         if pair[["cost", "cost_plain"]].to_numpy().min() <= 0.0:
             continue
         factors = (pair.cost / pair.cost_plain).to_numpy()
-        out.append((*key, geometric(pair.ideal_ratio_plain), geometric_mean(factors), *geometric_interval(factors)))
+        out.append((*key, _geometric(pair.ideal_ratio_plain), geometric_mean(factors), *geometric_interval(factors)))
     return pd.DataFrame(out, columns=[*_LINE, "ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"])
 
 

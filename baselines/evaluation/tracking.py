@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 
 from baselines.evaluation.export import table, trajectory_log
 from baselines.evaluation.foreign import Wrap
-from baselines.evaluation.jobs import Job
+from baselines.evaluation.jobs import job_of
 from baselines.evaluation.motion.free_timing import as_long
 from baselines.evaluation.motion.message import joint_trajectory, mcap
 from baselines.evaluation.motion.played import Motion, by_joint
-from baselines.evaluation.play import play
 from baselines.evaluation.plots import tracking as picture
-from baselines.evaluation.policies import AnyPolicy, bind
+from baselines.evaluation.policies import AnyPolicy
+from baselines.evaluation.run import play
 from baselines.files import write
 from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
@@ -158,10 +158,7 @@ def track(
     found = scenarios.find(scenario)
     if steps is not None:
         found = found.replace(steps=min(whole_number("steps", steps, at_least=1), found.steps))
-    whole_number("seed", seed, at_least=0)
-    seeds = Seeds(seed)
-    one, parameters, shown = bind(policy, found, seeds, preview, wrap)
-    job = Job(found, one, parameters, seeds, first=True, record=True, timed=True, preview=shown)
+    job = job_of(policy, found, whole_number("seed", seed, at_least=0), preview, wrap)
     ((row, episode),) = play((job,))
     assert episode is not None  # since the job asks for it
     found = as_long(found, episode)
@@ -171,4 +168,4 @@ def track(
     arrays["nominal"] = found.nominal(seed)[1:]
     arrays["statuses"] = episode.status
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _played=(found, seeds, episode))
+    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _played=(found, job.seeds, episode))

@@ -19,7 +19,7 @@ from optuna.trial import Trial, TrialState
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, rounded
 from baselines.episodes import rollouts
-from baselines.files import ResultsError, check_flags, read_bytes, reading
+from baselines.files import check_flags, check_same, read_bytes, reading
 from baselines.fingerprints import fingerprint
 from baselines.recording import add_up
 from baselines.spec import parse_policy
@@ -158,8 +158,7 @@ def run(
         WorkerError: A worker died.
     """
     file, crew = folder / JOURNAL, Workers(workers)
-    check_flags(file, resume=resume, overwrite=overwrite)
-    if overwrite:
+    if not check_flags(file, resume=resume, overwrite=overwrite):
         file.unlink(missing_ok=True)
     pathlib.Path(f"{file}.lock").unlink(missing_ok=True)  # of a process that was killed
     with reading(file, "Begin again with --overwrite."):
@@ -190,9 +189,7 @@ def _begin(file: pathlib.Path, search: Search) -> None:
     study = _study(file, search)
     about = {"fingerprint": fingerprint(search.scenario), "episodes": len(search.seeds), "seed": search.seed}
     about |= {"ranges": canonical(dict(search.ranges))}
-    if (known := study.user_attrs.get("about", about)) != about:
-        names = ", ".join(name for name in about if known.get(name) != about[name])
-        raise ResultsError(f"{file} has a search of {search.spec} with other {names}. Choose another folder.")
+    check_same(file, study.user_attrs.get("about", about), about, f" of {search.spec}")
     study.set_user_attr("about", about)
     for trial in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):  # of a process that was killed
         study.tell(trial.number, state=TrialState.FAIL)

@@ -98,8 +98,7 @@ class Follower:
 
 def follower(stage: Stage, policy: str) -> Follower | None:
     """The follower of a policy; None if it has privileged information or needs an environment."""
-    found = specification(policy)
-    player = found.bind(stage.scenario, found.given(stage.scenario, Seeds(stage.seed)), None)
+    player = specification(policy).bind(stage.scenario, Seeds(stage.seed))
     if not isinstance(player, SolverPolicy) or player.reference:
         return None
     return Follower(stage.scenario, player, stage.start)

@@ -13,8 +13,7 @@ import numpy.typing as npt
 from tqdm import tqdm
 
 import baselines
-from baselines.evaluation.policies import bind
-from baselines.recording import Seeds
+from baselines.evaluation.jobs import job_of
 from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
@@ -98,7 +97,7 @@ def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
         raise InvalidInputError("policy: expected at least one, got none.")
     wanted, replays = list(dict.fromkeys(policies)), []
     for policy in wanted:  # all are checked before one plays
-        bind(policy, stage.scenario, Seeds(stage.seed))
+        job_of(policy, stage.scenario, stage.seed)
     for policy in tqdm(wanted, disable=None, file=sys.stderr, unit="policy"):
         made = baselines.track(stage.scenario, policy, seed=stage.seed)
         steps = np.maximum(np.arange(stage.scenario.steps + 1) - 1, 0)

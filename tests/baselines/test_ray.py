@@ -17,7 +17,7 @@ import ray
 from ray.cluster_utils import Cluster
 
 from baselines.evaluate import evaluate
-from baselines.evaluation import play as playing
+from baselines.evaluation import run as playing
 from baselines.workers import ClusterError, Workers, finished
 from tests.baselines.test_workers import needs_proc, wait_for
 

@@ -94,7 +94,7 @@ def test_only_the_same_search_is_resumed(tmp_path):
     run(tmp_path, 1)
     with pytest.raises(ResultsError, match="already exists: continue with --resume"):
         run(tmp_path, 1)
-    with pytest.raises(ResultsError, match="has a search of dls with other seed"):
+    with pytest.raises(ResultsError, match=r"differs in seed .* of dls"):
         run(tmp_path, 1, resume=True, seed=1)
     (tmp_path / JOURNAL).write_text("{}\n[]\n")
     with pytest.raises(ResultsError, match="is damaged"):

@@ -6,8 +6,8 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable
-from typing import Annotated
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -16,11 +16,13 @@ from baselines.cli import shell
 from baselines.cli.parsing import Rule, varies
 from baselines.evaluation import test_sets
 from baselines.evaluation.jobs import Options
-from baselines.evaluation.metrics import Row
-from baselines.evaluation.results import PAGE, Rows
+from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.run import carry_out
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -128,12 +130,11 @@ def cut_off(played: Iterable[Scenario]) -> list[str]:
     ]
 
 
-def _show(rows: Rows) -> None:
+def _show(lines: pd.DataFrame, skipped: Sequence[Skipped]) -> None:
     """Prints the table."""
-    from baselines.evaluation import report  # pandas is slow to import, and not needed before
-    from baselines.evaluation.summary import summarise
+    from baselines.evaluation import report  # pandas is slow to import
 
-    print(report.table(summarise(rows), rows.skipped, width=shell.width()), flush=True)
+    print(report.table(lines, skipped, width=shell.width()), flush=True)
 
 
 def _work(given: Arguments, command: str) -> None:
@@ -143,7 +144,9 @@ def _work(given: Arguments, command: str) -> None:
     if given.out is not None:
         for name in ["table.md"] * given.leaderboard + ["map.md"] * bool(given.severities):
             print(f"\n{(given.out / name).read_text(encoding='utf-8')}", end="")
-        print(f"\nwritten to {given.out}" + (f"; open {given.out / PAGE} in a browser" if given.report else ""))
+        print(
+            f"\nwritten to {given.out}" + (f"; open {given.out / 'report.html'} in a browser" if given.report else "")
+        )
 
 
 main = shell.Command("evaluate", Arguments, manual, _work, RULES, shell.RESUMED, "baselines.evaluate")

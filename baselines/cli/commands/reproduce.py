@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
 import pathlib
 import sys
 from collections.abc import Iterable, Mapping
@@ -21,7 +20,7 @@ from baselines.cli import shell
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.evaluation.table import to_csv
-from baselines.files import locked, write
+from baselines.files import locked, write, write_json
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs
@@ -97,8 +96,7 @@ def _write_numbers(file: pathlib.Path, findings: Mapping[str, Finding]) -> None:
         name: {"verdict": found.verdict, "holds": found.holds, "figures": found.figures}
         for name, found in findings.items()
     }
-    content = jsonable({"machine": describe(), "claims": claims})
-    write(file, (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+    write_json(file, jsonable({"machine": describe(), "claims": claims}))
 
 
 @dataclasses.dataclass(frozen=True)

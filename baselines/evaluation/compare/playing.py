@@ -12,13 +12,12 @@ import numpy as np
 from baselines import registry
 from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
-from baselines.evaluation.columns import COLUMNS as EVERY
-from baselines.evaluation.columns import ERRORS, TIMES
 from baselines.evaluation.compare.library_times import with_library_times
 from baselines.evaluation.compare.rule import PREFERRED, RULE, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
-from baselines.evaluation.summary import summarise
+from baselines.evaluation.summary import COLUMNS as EVERY
+from baselines.evaluation.summary import ERRORS, TIMES, summarise
 from baselines.evaluation.table import Column, plain
 from baselines.paths import retime
 from ikgym.exceptions import InvalidInputError

@@ -14,11 +14,12 @@ from typing import Any
 import pandas as pd
 
 from baselines.evaluation import report
-from baselines.evaluation.columns import REPORT, columns
 from baselines.evaluation.html.series import BUDGET, thinned
-from baselines.evaluation.jobs import Skipped
+from baselines.evaluation.metrics import Skipped
 from baselines.evaluation.results import Results
+from baselines.evaluation.summary import REPORT, columns, escape_names
 from baselines.evaluation.table import html
+from ikgym.exceptions import printable
 
 #: A placeholder in the template.
 PLACE = re.compile(r"\[\[(\w+)\]\]")
@@ -30,6 +31,7 @@ def page(
     """The report of a folder of results, whose rows are summarised in lines."""
     from plotly.offline import get_plotlyjs  # slow to import, and not needed for rows
 
+    series, lines = _series(results, lines), escape_names(lines)
     scenarios = lines.scenario.unique().tolist()
     numbers = {"scenarios": len(scenarios), "policies": lines.label.nunique(), "episodes": lines.rows.sum()}
     parts = {
@@ -41,7 +43,7 @@ def page(
         "notes": _items(report.remarks(lines, skipped)),
         "conditions": _items([f"command: {command}", *report.machines(lines)]),
         "parameters": _items(report.parameters(lines)),
-        "data": embedded(data(results, lines)),
+        "data": embedded(data(lines, series)),
         "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
         "script": _file("page.js"),
@@ -49,17 +51,23 @@ def page(
     return PLACE.sub(lambda found: parts[found[1]], _file("template.html")).encode()
 
 
-def data(results: Results, lines: pd.DataFrame) -> list[dict[str, Any]]:
+def data(lines: pd.DataFrame, series: Sequence[dict[str, Any] | None]) -> list[dict[str, Any]]:
     """The data of the plots: costs, times and the thinned trajectory log of each line of the table."""
-    logged = [results.series_file(line).exists() for line in lines.itertuples()]
     return [
         {
             **{"scenario": line.scenario, "policy": line.label, "reference": line.reference, "quantity": line.quantity},
             **{"low": _finite(line.low), "high": _finite(line.high), "value": _finite(line.mean)},
-            "time": _finite(line.time_p50_us),
-            "seed": line.first_seed,
-            "series": thinned(results.series(line), BUDGET // sum(logged)) if there else None,
+            **{"time": _finite(line.time_p50_us), "seed": line.first_seed, "series": log},
         }
+        for line, log in zip(lines.itertuples(), series, strict=True)
+    ]
+
+
+def _series(results: Results, lines: pd.DataFrame) -> list[dict[str, Any] | None]:
+    """The thinned trajectory log of each line; None where there is none."""
+    logged = [results.series_file(line).exists() for line in lines.itertuples()]
+    return [
+        thinned(results.series(line), BUDGET // sum(logged)) if there else None
         for line, there in zip(lines.itertuples(), logged, strict=True)
     ]
 
@@ -79,4 +87,4 @@ def _file(name: str) -> str:
 
 
 def _items(texts: Iterable[str]) -> str:
-    return "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return "".join(f"<li>{escape(printable(text))}</li>" for text in texts)

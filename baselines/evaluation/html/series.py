@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from baselines.evaluation.export import TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
+from ikgym.exceptions import printable
 from ikgym.obstacles.solids import bounded, in_space, surface
 from ikgym.validation import FloatArray
 
@@ -49,8 +50,8 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
             arrays[name] = np.fmax.reduceat(log[name], starts)
     arrays |= {name: _largest(log[name], starts) for name in ("qdot", "qddot") if name in log}
     arrays["limit"] = np.maximum.reduceat(limits(log), starts)
-    out: dict[str, Any] = {name: log[name].tolist() for name in ("joint_names", "prismatic")}
-    out["rows"] = len(log["time"])
+    out: dict[str, Any] = {"prismatic": log["prismatic"].tolist(), "rows": len(log["time"])}
+    out["joint_names"] = list(map(printable, log["joint_names"].tolist()))
     arrays["points"], out["joint_ends"] = _links(log, picked)
     arrays["rotation"] = log["tool_rotation"][picked].reshape(-1, 9)
     if carriers:

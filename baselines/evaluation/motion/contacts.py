@@ -1,4 +1,4 @@
-"""Bodies and obstacles of an episode: how close they came, and where they are in space."""
+"""Bodies and obstacles of an episode: where they are in space."""
 
 from __future__ import annotations
 
@@ -7,32 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.recording import Episode, Seeds, add_up
+from baselines.recording import Seeds
 from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
 #: The frame of fixed objects.
 AT_REST = np.append(np.eye(3), np.zeros(3))
-
-
-def contacts(scenario: Scenario, episode: Episode) -> dict[str, Any]:
-    """The columns of a row that state it, and its cost, see :class:`baselines.evaluation.metrics.Row`.
-
-    None where nothing can meet.
-    """
-    if episode.clearance is None or episode.pair is None or episode.stopped is None or episode.pair[0, 0] < 0:
-        return {}
-    stops = np.flatnonzero(episode.stopped)
-    until = episode.clearance[: stops[0] + 1] if len(stops) else episode.clearance
-    step = int(stops[0] if len(stops) else until.argmin())
-    return {
-        "clearance_min": float(until.min()),
-        "closest_pair": list(scenario.pair_names(episode.pair[step].astype(np.int64).tolist())),
-        "closest_step": step + 1,
-        "stopped": step + 1 if len(stops) else None,
-        "proximity_cost": None if episode.proximity_cost is None else float(add_up(episode.proximity_cost)),
-    }
 
 
 def carried(

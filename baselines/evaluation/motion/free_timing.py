@@ -58,12 +58,7 @@ def as_long(scenario: Scenario, episode: Episode) -> Scenario:
 
 
 def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> dict[str, float | None]:
-    """The columns of a row that state how the path was followed, see :class:`baselines.evaluation.metrics.Row`.
-
-    Empty for a policy without free timing.
-    """
-    if "progress" not in episode.diagnostics:
-        return {}
+    """The columns of a row that state how the path was followed, see :class:`baselines.evaluation.metrics.Row`."""
     task, end = scenario.task, _end(scenario, episode)
     error = task.error(reference_at(scenario, seeds, episode.diagnostics["progress"]), episode.pose)[:end]
     first = 0 if task.kind in (POSE, AXIS) else task.error_size - 3

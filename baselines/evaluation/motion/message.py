@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import pathlib
 import tempfile
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from baselines.evaluation.motion.played import Motion
 from baselines.evaluation.motion.spline import smooth
 from baselines.evaluation.motion.stop import stopped
+from baselines.files import json_text
 from baselines.recording import Episode, Seeds
 from ikgym.scenarios import Scenario
 
@@ -53,8 +53,7 @@ def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: b
 
 def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
     """The message in JSON, which `ros2 topic pub` reads; see :func:`message`."""
-    fields = message(scenario, seeds, episode, accelerations)
-    return (json.dumps(fields, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    return json_text(message(scenario, seeds, episode, accelerations)).encode()
 
 
 def mcap(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from baselines.evaluate import evaluate
-from baselines.evaluation import play as playing
+from baselines.evaluation import run as playing
 from baselines.evaluation.results import read_rows
 from baselines.workers import ClusterError, WorkerError, Workers
 from tests.baselines.losing import LosingCluster
@@ -63,7 +63,7 @@ def test_another_version_of_the_code_is_refused(pool, monkeypatch):
         return [(dataclasses.replace(row, fingerprint="0" * 12), episode) for row, episode in plain(*arguments)]
 
     monkeypatch.setattr(playing, "play", other)
-    with pytest.raises(WorkerError, match="has played something else than dls in varga7-random: it has ikgym"):
+    with pytest.raises(WorkerError, match="dls in varga7-random: a worker returned results of another job or version"):
         play(cluster="ray")
 
 

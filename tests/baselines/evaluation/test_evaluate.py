@@ -13,8 +13,8 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import run as module
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, describe
-from baselines.evaluation.play import MOST, batches
 from baselines.evaluation.results import COLUMNS, PAGE, Results, read_rows
+from baselines.evaluation.run import MOST, batches
 from baselines.files import ResultsError
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -268,12 +268,12 @@ def test_resuming_adds_episodes_and_policies(tmp_path):
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [
-        ({"machine": {"ikgym": "0.0.1"}}, {}, r"results of ikgym 0\.0\.1, this run has"),
-        ({"fingerprint": "000000000000"}, {}, "another scenario varga7-random with fingerprint 000000000000"),
-        ({}, {"steps": 6}, "varga7-random with steps 5, this run has 6"),
-        ({}, {"split": "validation"}, "varga7-random on the split test, this run has validation"),
-        ({}, {"preview": 3}, "dls in varga7-random with preview 1, this run has 3"),
-        ({"test_set": "0123456789ab"}, {}, "varga7-random in the test set 0123456789ab, this run has none"),
+        ({"machine": {"ikgym": "0.0.1"}}, {}, r"version of ikgym \('0\.0\.1' there"),
+        ({"fingerprint": "000000000000"}, {}, r"fingerprint \('000000000000' there"),
+        ({}, {"steps": 6}, r"steps \(5 there, 6 here\) of dls in varga7-random"),
+        ({}, {"split": "validation"}, r"split \('test' there, 'validation' here\)"),
+        ({}, {"preview": 3}, r"preview \(1 there, 3 here\)"),
+        ({"test_set": "0123456789ab"}, {}, r"test set \('0123456789ab' there, None here\)"),
     ],
 )
 def test_what_cannot_be_compared_is_not_gone_on_with(tmp_path, change, options, message):

@@ -10,11 +10,10 @@ import baselines
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.columns import COLUMNS
 from baselines.evaluation.motion.free_timing import reference_at
 from baselines.evaluation.motion.stop import FEWEST
 from baselines.evaluation.rankings import ranking
-from baselines.evaluation.summary import summarise
+from baselines.evaluation.summary import COLUMNS, summarise
 from baselines.evaluation.table import records
 from baselines.recording import Seeds, add_up
 from tests.baselines.solvers.quadratic_program.paths import circle

@@ -11,8 +11,7 @@ from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report, run
 from baselines.evaluation.export import trajectory_log
-from baselines.evaluation.jobs import Skipped
-from baselines.evaluation.metrics import Row
+from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.plots import tracking
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import number

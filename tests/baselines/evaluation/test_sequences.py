@@ -10,7 +10,7 @@ import baselines
 import ikgym
 from baselines.episodes import rollout, rollouts
 from baselines.evaluate import evaluate
-from baselines.evaluation.play import batches, play
+from baselines.evaluation.run import batches, play
 from baselines.policy import Solution, SolverPolicy, statuses
 from baselines.recording import Seeds
 from ikgym import Plant
