@@ -78,13 +78,13 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
     return "\n\n".join([*parts, "\n".join(wrapped)]).rstrip()
 
 
-def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> bytes:
+def readme(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, command: str, date: datetime.datetime) -> str:
     """The README of a folder of results: tables, parameters and conditions as one block of text in Markdown."""
     conditions = [f"command: {command}", f"finished: {date:%Y-%m-%d %H:%M} UTC", *machines(lines)]
     text = "\n\n".join([table(lines, skipped, width=WIDE), *map("\n".join, (parameters(lines), conditions))])
     text = printable(text, "\n")
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
-    return f"# Results\n\n{fence}text\n{text}\n{fence}\n".encode()
+    return f"# Results\n\n{fence}text\n{text}\n{fence}\n"
 
 
 def heading(lines: pd.DataFrame) -> str:

@@ -264,7 +264,7 @@ def _write_tables(
     from baselines.evaluation.results import PAGE
 
     now = datetime.datetime.now(datetime.UTC)
-    results.write("README.md", report.readme(lines, rows.skipped, command=command, date=now))
+    results.write("README.md", report.readme(lines, rows.skipped, command=command, date=now).encode())
     if options.report:
         from baselines.evaluation.html.page import page
 

@@ -23,13 +23,9 @@ NOTHING, LAST = "–", 1e300
 LONGEST = 20
 #: Suffixes of columns and the units in the heads.
 UNITS = {
+    **{unit: unit for unit in ("ms", "s", "mm", "mrad", "rad")},
     "us": "µs",
     "um": "µm",
-    "ms": "ms",
-    "s": "s",
-    "mm": "mm",
-    "mrad": "mrad",
-    "rad": "rad",
     "deg": "°",
     "percent": "%",
 }
@@ -91,37 +87,36 @@ def plain(chosen: Sequence[Column], lines: pd.DataFrame, width: int) -> tuple[st
     Returns:
         The text, and columns that are left out since even then they do not fit.
     """
-    kept, cells = list(chosen), {column.key: column.cells(lines) for column in chosen}
+    kept, texts = list(chosen), {column.key: [column.title, column.unit, *column.cells(lines)] for column in chosen}
+    sizes = {
+        column.key: max(n for n in map(_width, texts[column.key]) if column.key != "label" or n <= LONGEST)
+        for column in chosen
+    }
+
+    def room(gap: int) -> int:
+        return sum(sizes[column.key] for column in kept) + gap * (len(kept) - 1)
+
     for column in sorted(chosen, key=lambda column: -column.drop):
-        sizes = [_size(column, cells[column.key]) for column in kept]
-        if not column.drop or sum(sizes) + len(sizes) - 1 <= width:
+        if not column.drop or room(1) <= width:
             break
         kept.remove(column)
-    gap = "  " if sum(sizes) + 2 * (len(sizes) - 1) <= width else " "
-
-    def joined(line: Sequence[str], left: Sequence[bool]) -> str:
-        blanks = [" " * (size - _width(text)) for text, size in zip(line, sizes, strict=True)]
-        padded = [a + b if leftwards else b + a for a, b, leftwards in zip(line, blanks, left, strict=True)]
-        if _width(line[0]) > LONGEST:
-            padded[0] = f"{line[0]}\n{' ' * sizes[0]}"
-        return gap.join(padded).rstrip()
-
-    left = [column.format is str for column in kept]
-    heads = [[column.title for column in kept], [column.unit for column in kept]]
-    body = zip(*(cells[column.key] for column in kept), strict=True)
-    rule = "-" * (sum(sizes) + len(gap) * (len(sizes) - 1))
-    out = [joined(line, left) for line in heads[: 1 + any(heads[1])]] + [rule] + [joined(line, left) for line in body]
-    return "\n".join(out), [column for column in chosen if column not in kept]
-
-
-def _size(column: Column, cells: Iterable[str]) -> int:
-    """The width of a column; long names of policies have a line of their own."""
-    most = LONGEST if column.key == "label" else math.inf
-    return max(size for text in (column.title, column.unit, *cells) if (size := _width(text)) <= most)
+    gap = 2 if room(2) <= width else 1
+    rows = []
+    for line in zip(*(texts[column.key] for column in kept), strict=True):
+        padded = [
+            text + blank if column.format is str else blank + text
+            for column, text in zip(kept, line, strict=True)
+            for blank in [" " * (sizes[column.key] - _width(text))]
+        ]
+        if _width(line[0]) > LONGEST:  # a long name has a line of its own
+            padded[0] = f"{line[0]}\n{' ' * sizes[kept[0].key]}"
+        rows.append((" " * gap).join(padded).rstrip())
+    heads = rows[: 1 + any(column.unit for column in kept)]
+    return "\n".join([*heads, "-" * room(gap), *rows[2:]]), [column for column in chosen if column not in kept]
 
 
 def _width(text: str) -> int:
-    """Columns that a text takes on a terminal: the dot of q̇ has none of its own."""
+    """Columns that a text takes on a terminal: the dot of q̇ has none."""
     return len(text) - text.count("\u0307")
 
 
@@ -134,19 +129,17 @@ def html(chosen: Sequence[Column], lines: pd.DataFrame) -> str:
     out.append("</tr></thead><tbody>")
     cells = [column.cells(lines) for column in chosen]
     for place, line in enumerate(lines.itertuples(index=False)):
-        name = escape(line.label + " *" * line.reference + " ‡" * line.free_timing)
-        scenario = escape(line.scenario)
-        out += [
+        name, scenario = escape(line.label + " *" * line.reference + " ‡" * line.free_timing), escape(line.scenario)
+        out.append(
             f'<tr><td class="pick"><input type="checkbox" value="{place}" aria-label="{name} in {scenario}: show in '
             f'the plots"></td><th scope="row" class="name">{name}</th><td>{scenario}</td>'
-        ]
+        )
         for column, texts in zip(chosen, cells, strict=True):
-            value, text = getattr(line, column.key), escape(texts[place])
-            if column.format is str:
-                out.append(f"<td>{text}</td>")
-            else:
+            value, text, attributes = getattr(line, column.key), escape(texts[place]), ""
+            if column.format is not str:
                 order = value if text != NOTHING and math.isfinite(value) else LAST
-                out.append(f'<td class="number" data-order="{order}">{text}</td>')
+                attributes = f' class="number" data-order="{order}"'
+            out.append(f"<td{attributes}>{text}</td>")
         out.append("</tr>")
     return "".join([*out, "</tbody></table>"])
 
@@ -158,8 +151,12 @@ def records(lines: pd.DataFrame | Iterable[Mapping[str, Any]]) -> list[Mapping[s
 
 def to_csv(lines: pd.DataFrame | Iterable[Mapping[str, Any]]) -> str:
     """Lines as CSV: numbers with six significant digits, None and NaN as an empty cell."""
-    found = records(lines)
-    return csv_text(found[0], ([_plain(line[name]) for name in found[0]] for line in found))
+
+    def cell(value: Any) -> Any:
+        return (None if math.isnan(value) else float(f"{value:.6g}")) if isinstance(value, float) else value
+
+    rows = records(lines)
+    return csv_text(rows[0], ([cell(line[name]) for name in rows[0]] for line in rows))
 
 
 def from_csv(text: str) -> list[dict[str, str]]:
@@ -172,28 +169,20 @@ def markdown(lines: pd.DataFrame | Iterable[Mapping[str, Any]], names: Sequence[
 
     Names of columns end with the unit (`time_p50_us`). An interval is a pair of columns `low` and `high`, possibly with
     a prefix; the column `low` shows it. All columns are shown if none is named.
+
+    Raises:
+        InvalidInputError: There is no column of a name.
     """
-    found = records(lines)
-    names = [name for name in names or found[0] if not _ends(name, "high")]
-    if missing := [name for name in names if name not in found[0]]:
-        raise InvalidInputError(f"columns: expected some of {', '.join(found[0])}; got {', '.join(missing)}.")
-    cells = [[_cell(line, name) for name in names] for line in found]
-    text = [i for i, name in enumerate(names) if any(_value(line[name]) is None for line in found if line[name])]
-    return grid([_head(name) for name in names], cells, text=text)
-
-
-def _plain(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    return None if math.isnan(value) else float(f"{value:.6g}")
-
-
-def _ends(name: str, end: str) -> bool:
-    return name == end or name.endswith(f"_{end}")
+    rows = records(lines)
+    names = [name for name in names or rows[0] if not f"_{name}".endswith("_high")]
+    if missing := [name for name in names if name not in rows[0]]:
+        raise InvalidInputError(f"columns: expected some of {', '.join(rows[0])}; got {', '.join(missing)}.")
+    text = [i for i, name in enumerate(names) if any(_number(line[name]) is None for line in rows if line[name])]
+    return grid(map(_head, names), ([_cell(line, name) for name in names] for line in rows), text=text)
 
 
 def _head(name: str) -> str:
-    if _ends(name, "low"):
+    if f"_{name}".endswith("_low"):
         return "95 %"
     words, _, unit = name.rpartition("_")
     words, unit = (words, f" [{UNITS[unit]}]") if words and unit in UNITS else (name, "")
@@ -204,11 +193,11 @@ def _cell(line: Mapping[Any, Any], name: str) -> str:
     value = line[name]
     if value in ("", None) or value != value:
         return NOTHING
-    if _ends(name, "low"):
+    if f"_{name}".endswith("_low"):
         return interval(float(value), float(line[name.removesuffix("low") + "high"]))
     if name in CODE:
         return code(str(value)).replace("|", "\\|")
-    found = _value(value)
+    found = _number(value)
     if found is None:
         return escaped(str(value))
     if found.is_integer() and "." not in str(value):
@@ -218,7 +207,7 @@ def _cell(line: Mapping[Any, Any], name: str) -> str:
     return f"{found:,.0f}" if name.endswith("_us") and found >= 10.0 else number(found)
 
 
-def _value(cell: Any) -> float | None:
+def _number(cell: Any) -> float | None:
     """The number in a cell; None for text."""
     try:
         return float(cell)
@@ -238,7 +227,8 @@ def code(text: str) -> str:
     return f"{fence} {line} {fence}" if "`" in line else f"{fence}{line}{fence}"
 
 
-def grid(head: Sequence[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:
+def grid(head: Iterable[str], lines: Iterable[Sequence[str]], *, text: Sequence[int] = ()) -> str:
     """A Markdown table of cells; the columns whose numbers are in `text` are aligned to the left."""
+    head = list(head)
     rules = [":--" if column in text else "--:" for column in range(len(head))]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, rules, *lines))

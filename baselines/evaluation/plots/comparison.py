@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -25,6 +25,9 @@ CUT = 100.0
 CLOSE, EVEN = 300.0, 4.0
 #: One line of a table: the name of each column and its value, or the text of it.
 Record = Mapping[str, Any]
+#: Columns of numbers.
+NUMBERS = ("cost_ratio", "low", "high", "time_p99_us", "foresight", "episodes", "lost_percent", "knowledge", "drives")
+EXCESS = "cost above the reference [%]"
 
 
 def front(lines: Sequence[Record]) -> list[Record]:
@@ -32,22 +35,7 @@ def front(lines: Sequence[Record]) -> list[Record]:
 
     Lines without times, or with fewer episodes than others, are left out.
     """
-    most = max(int(line["episodes"]) for line in lines)
-    timed = [line for line in lines if _timed(line) and int(line["episodes"]) == most]
-    out: list[Record] = []
-    for line in sorted(timed, key=lambda line: (float(line["time_p99_us"]), float(line["cost_ratio"]))):
-        if not out or float(line["cost_ratio"]) < float(out[-1]["cost_ratio"]):
-            out.append(line)
-    return out
-
-
-def _timed(line: Record) -> bool:
-    return math.isfinite(_number(line["time_p99_us"])) and math.isfinite(_number(line["cost_ratio"]))
-
-
-def _number(cell: object) -> float:
-    """The number in a cell; NaN in an empty one."""
-    return math.nan if cell in ("", None) else float(str(cell))
+    return [lines[place] for place in _front(_frame(lines)).index]
 
 
 def cost_time(lines: Sequence[Record], title: str) -> Figure:
@@ -55,63 +43,51 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
 
     All policies have a name in the legend if there are colours enough; else those of the front.
     """
-    drawn = style.figure(4.6)
-    axes = drawn.subplots()
-    timed, best = [line for line in lines if _timed(line)], front(lines)
+    drawn, table = style.figure(4.6), _frame(lines)
+    axes, timed, best = drawn.subplots(), table[_is_timed(table)], _front(table)
     named = timed if len(timed) <= len(style.COLOURS) else best
-    for line in timed:
-        if line not in named:
-            _interval(axes, float(line["time_p99_us"]), line, color=style.STEEL, marker="o", ms=3.5, lw=0.8)
-    times, excess = [float(line["time_p99_us"]) for line in best], [_excess(line["cost_ratio"]) for line in best]
-    axes.step(times, excess, where="post", color=style.MIST, lw=3.0, zorder=1)
+    for line in timed.drop(named.index).itertuples():
+        _interval(axes, line.time_p99_us, line, color=style.STEEL, marker="o", ms=3.5, lw=0.8)
+    axes.step(best.time_p99_us, best.excess, where="post", color=style.MIST, lw=3.0, zorder=1)
     points = []
-    for place, line in enumerate(named):
+    for place, line in enumerate(named.itertuples()):
         look = {"color": style.looks(place)["color"], "marker": "osD^v"[place % 5]}
-        points.append(_interval(axes, float(line["time_p99_us"]), line, ms=7.0, lw=1.2, ls="", **look))
-    _logarithmic(axes)
-    style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel="cost above the reference [%]")
+        points.append(_interval(axes, line.time_p99_us, line, ms=7.0, lw=1.2, ls="", **look))
+    _set_logarithmic(axes)
+    style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel=EXCESS)
     title = style.literal(f"{title}: cost against time, and the Pareto front")
-    style.legend(drawn, title, points, [style.literal(str(one["policy"])) for one in named])
+    style.legend(drawn, title, points, [style.literal(str(policy)) for policy in named.policy])
     return drawn
 
 
 def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
     """Excess cost against foresight, with intervals: a panel per scenario, a series per value of the column `by`."""
-    drawn = style.figure(3.4)
-    scenarios = list(dict.fromkeys(line["scenario"] for line in lines))
+    drawn, table = style.figure(3.4), _frame(lines)
+    scenarios, series = table.scenario.unique(), table[by].unique()
     panels = drawn.subplots(1, len(scenarios), squeeze=False)[0]
-    series = list(dict.fromkeys(line[by] for line in lines))
     for axes, scenario in zip(panels, scenarios, strict=True):
-        here = [line for line in lines if line["scenario"] == scenario]
-        handles = []
+        here, handles = table[table.scenario == scenario].sort_values("foresight", kind="stable"), []
         for place, value in enumerate(series):
-            some = sorted((line for line in here if line[by] == value), key=lambda line: int(line["foresight"]))
-            ahead = np.array([int(line["foresight"]) for line in some])
-            handles += axes.plot(ahead, [_excess(line["cost_ratio"]) for line in some], lw=1.4, **style.looks(place))
-            for steps, line in zip(ahead, some, strict=True):
-                _interval(axes, float(steps), line, marker="o", ms=4.5, color=style.looks(place)["color"])
-        _logarithmic(axes)
-        axes.xaxis.set_major_locator(FixedLocator(sorted({int(line["foresight"]) for line in here})))
-        style.dress(
-            axes, xlabel="foresight [steps]", ylabel="cost above the reference [%]", title=style.literal(str(scenario))
-        )
-    names = [style.literal(f"{by.replace('_', ' ')}: {value}") for value in series]
-    style.legend(drawn, title, handles, names)
+            some = here[here[by] == value]
+            handles += axes.plot(some.foresight, some.excess, lw=1.4, **style.looks(place))
+            for line in some.itertuples():
+                _interval(axes, line.foresight, line, marker="o", ms=4.5, color=style.looks(place)["color"])
+        _set_logarithmic(axes)
+        axes.xaxis.set_major_locator(FixedLocator(sorted(here.foresight.unique())))
+        style.dress(axes, xlabel="foresight [steps]", ylabel=EXCESS, title=style.literal(str(scenario)))
+    style.legend(drawn, title, handles, [style.literal(f"{by.replace('_', ' ')}: {value}") for value in series])
     return drawn
 
 
 def severity_map(lines: Sequence[Record]) -> Figure:
     """Cost ratios over two severities of the plant, one panel per policy; below them the share of lost episodes."""
-    policies = list(dict.fromkeys(str(line["policy"]) for line in lines))
-    across = min(len(policies), 2)
-    down = -(-len(policies) // across)
+    panels_of = list(_frame(lines).groupby("policy", sort=False))
+    across = min(len(panels_of), 2)
+    down = -(-len(panels_of) // across)
     drawn = style.figure(3.4 * down + 0.4, 3.8 * across + 0.8)
     panels = drawn.subplots(down, across, squeeze=False).ravel()
-    shades = [
-        _severities(axes, policy, [line for line in lines if line["policy"] == policy])
-        for axes, policy in zip(panels, policies, strict=False)
-    ]
-    for axes in panels[len(policies) :]:
+    shades = [_severities(axes, str(policy), some) for axes, (policy, some) in zip(panels, panels_of, strict=False)]
+    for axes in panels[len(panels_of) :]:
         axes.set_visible(False)
     bar = drawn.colorbar(shades[0], ax=panels.tolist(), shrink=0.7, extend="max")
     bar.set_label("cost ratio", fontsize=style.SMALL)
@@ -119,23 +95,49 @@ def severity_map(lines: Sequence[Record]) -> Figure:
     return drawn
 
 
-def _severities(axes: Axes, policy: str, lines: Sequence[Record]) -> AxesImage:
-    knowledge, drives = (sorted({float(line[name]) for line in lines}) for name in ("knowledge", "drives"))
-    ratios = np.full((len(drives), len(knowledge)), np.nan)
-    for line in lines:
-        x, y, ratio = knowledge.index(float(line["knowledge"])), drives.index(float(line["drives"])), line["cost_ratio"]
-        ratios[y, x] = float(ratio)
-        lost = float(line["lost_percent"])
-        text = number(float(ratio)) + (f"\n{lost:.0f} % lost" if lost else "")
-        colour = "white" if float(ratio) > np.sqrt(CUT) else style.INK
-        axes.text(x, y, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+def _severities(axes: Axes, policy: str, table: pd.DataFrame) -> AxesImage:
+    ratios = table.pivot(index="drives", columns="knowledge", values="cost_ratio")
+    for line in table.itertuples():
+        text = number(line.cost_ratio) + (f"\n{line.lost_percent:.0f} % lost" if line.lost_percent else "")
+        colour = "white" if line.cost_ratio > np.sqrt(CUT) else style.INK
+        place = ratios.columns.get_loc(line.knowledge), ratios.index.get_loc(line.drives)
+        axes.text(*place, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
     shade = axes.imshow(np.clip(ratios, 1.0, CUT), norm=LogNorm(1.0, CUT), cmap="viridis_r", origin="lower")
     axes.set_title(style.literal(policy), fontsize=style.MEDIUM, loc="left")
-    axes.set_xticks(range(len(knowledge)), [f"{one:g}" for one in knowledge], fontsize=style.SMALL)
-    axes.set_yticks(range(len(drives)), [f"{one:g}" for one in drives], fontsize=style.SMALL)
+    axes.set_xticks(range(len(ratios.columns)), [f"{one:g}" for one in ratios.columns], fontsize=style.SMALL)
+    axes.set_yticks(range(len(ratios)), [f"{one:g}" for one in ratios.index], fontsize=style.SMALL)
     axes.set_xlabel("severity of calibration, payload and camera", fontsize=style.SMALL)
     axes.set_ylabel("severity of lag and delay", fontsize=style.SMALL)
     return shade
+
+
+def _frame(lines: Sequence[Record]) -> pd.DataFrame:
+    """The lines with numbers, NaN for none, and costs above the reference in [%] with the ends of their interval."""
+    table = pd.DataFrame(list(lines))
+    table = table.assign(**{name: pd.to_numeric(table[name], errors="coerce") for name in NUMBERS if name in table})
+    ends = {"excess": table.cost_ratio, "excess_low": table.low, "excess_high": table.high}
+    return table.assign(**{k: (100.0 * (v.fillna(table.cost_ratio) - 1.0)).clip(lower=FLOOR) for k, v in ends.items()})
+
+
+def _is_timed(table: pd.DataFrame) -> pd.Series:
+    return np.isfinite(table.time_p99_us) & np.isfinite(table.cost_ratio)
+
+
+def _front(table: pd.DataFrame) -> pd.DataFrame:
+    timed = table[_is_timed(table) & (table.episodes == table.episodes.max())]
+    timed = timed.sort_values(["time_p99_us", "cost_ratio"])
+    return timed[timed.cost_ratio < timed.cost_ratio.cummin().shift(fill_value=np.inf)]
+
+
+def _set_logarithmic(axes: Axes) -> None:
+    """Logarithmic axes with plain numbers, see :func:`_locator`."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(_locator(*axis.get_view_interval()))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
+        axis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _locator(low: float, high: float) -> Locator:
@@ -145,26 +147,7 @@ def _locator(low: float, high: float) -> Locator:
     return LogLocator(subs=(1.0, 2.0, 5.0) if high < CLOSE * low else (1.0,))
 
 
-def _logarithmic(axes: Axes) -> None:
-    """Logarithmic axes with plain numbers, see :func:`_locator`."""
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        axis.set_major_locator(_locator(low, high))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
-        axis.set_minor_formatter(NullFormatter())
-    axes.xaxis.set_minor_locator(NullLocator())
-
-
-def _excess(cost_ratio: object) -> float:
-    """The cost above the reference, in [%]."""
-    return max(100.0 * (_number(cost_ratio) - 1.0), FLOOR)
-
-
-def _interval(axes: Axes, x: float, line: Record, **look: Any) -> Artist:
+def _interval(axes: Axes, x: float, line: Any, **look: Any) -> Artist:
     """A point with the interval of its geometric mean."""
-    middle = _excess(line["cost_ratio"])
-    low, high = (middle if math.isnan(_number(line[name])) else _excess(line[name]) for name in ("low", "high"))
-    lengths = [[middle - min(low, middle)], [max(high, middle) - middle]]
-    return axes.errorbar([x], [middle], yerr=lengths, **look).lines[0]
+    below, above = line.excess - min(line.excess_low, line.excess), max(line.excess_high, line.excess) - line.excess
+    return axes.errorbar([x], [line.excess], yerr=[[below], [above]], **look).lines[0]
