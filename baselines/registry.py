@@ -6,7 +6,6 @@ Packages of others name theirs in the entry-point group :data:`GROUP`.
 from __future__ import annotations
 
 import functools
-import importlib
 import importlib.metadata
 import inspect
 import re
@@ -16,14 +15,12 @@ from typing import Any
 from baselines.policy import SolverPolicy
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.registry import check_import_path, import_object
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
 #: The entry points that other packages register policies by: ``name = "module:Class"``.
 GROUP = "ikgym.policies"
-
-#: How an import path is written: ``package.module:Class``.
-PLACE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 
 _SOLVERS = "baselines.solvers"
 
@@ -78,9 +75,7 @@ def names() -> tuple[str, ...]:
 
 
 def register(name: str, import_path: str | type[SolverPolicy]) -> None:
-    """Adds a policy of your own.
-
-    Results have the name that it is registered by, whatever the class calls itself.
+    """Adds a policy. Results have the name that it is registered by, whatever the class calls itself.
 
     Args:
         name: Its new name.
@@ -94,23 +89,26 @@ def register(name: str, import_path: str | type[SolverPolicy]) -> None:
     if name in names() or name in _incomplete:
         raise InvalidInputError(f"The policy {name!r} is registered already.")
     if isinstance(import_path, type):
-        _classes[name] = checked_class(import_path)
-        _import_paths[name] = place_of(import_path)
+        _classes[name] = check_class(import_path)
+        _import_paths[name] = import_path_of(import_path)
     else:
-        _import_paths[name] = _checked(import_path)
+        _import_paths[name] = check_import_path("policy", import_path)
 
 
 def get(name: str) -> type[SolverPolicy]:
-    """The class of a policy.
+    """The class of a policy, by its name or its import path ``"package.module:Class"``.
 
     Raises:
         UnknownNameError: There is no such policy; the message has the nearest name.
-        InvalidInputError: The registered class cannot be imported, or is no policy.
+        InvalidInputError: The class cannot be imported, or is no policy.
     """
     if not known(name):
+        if isinstance(name, str) and ":" in name:
+            return check_class(import_object("policy", name), name)
         raise UnknownNameError("policy", name, (*names(), *_incomplete))
     if name not in _classes:
-        _classes[name] = resolve({**_entry_points(), **_import_paths, **_incomplete}[name])
+        import_path = {**_entry_points(), **_import_paths, **_incomplete}[name]
+        _classes[name] = check_class(import_object("policy", import_path), import_path)
     return _classes[name]
 
 
@@ -121,39 +119,19 @@ def known(name: object) -> bool:
 
 def name_of(kind: type[SolverPolicy]) -> str:
     """Name of a class in results: its name in the registry, else its import path."""
-    import_path = place_of(kind)
-    places = {**_entry_points(), **_import_paths, **_incomplete}
-    return next((name for name, where in places.items() if where == import_path and get(name) is kind), import_path)
+    import_path = import_path_of(kind)
+    import_paths = {**_entry_points(), **_import_paths, **_incomplete}
+    return next(
+        (name for name, where in import_paths.items() if where == import_path and get(name) is kind), import_path
+    )
 
 
-def place_of(kind: type[Any]) -> str:
+def import_path_of(kind: type[Any]) -> str:
     """Import path of a class: ``"package.module:Class"``."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
-def resolve(import_path: str) -> type[SolverPolicy]:
-    """The class at an import path.
-
-    Raises:
-        InvalidInputError: It cannot be imported, or is no class of policies.
-    """
-    return checked_class(load(import_path), import_path)
-
-
-def load(import_path: str) -> object:
-    """The object at an import path ``"package.module:attribute"``.
-
-    Raises:
-        InvalidInputError: It has another form, or cannot be imported.
-    """
-    module, _, attribute = _checked(import_path).partition(":")
-    try:
-        return functools.reduce(getattr, attribute.split("."), importlib.import_module(module))
-    except Exception as e:  # whatever the module of somebody else raises
-        raise InvalidInputError(f"Policy {import_path!r}: cannot be imported: {type(e).__name__}: {e}.") from e
-
-
-def imported(import_path: str) -> object:
+def find_imported(import_path: str) -> object:
     """The object at an import path whose module has been imported; None if it has not, or there is none."""
     module, _, attribute = import_path.partition(":")
     found: object = sys.modules.get(module)
@@ -166,10 +144,10 @@ def make(name: str, scenario: str | Scenario, **parameters: Any) -> SolverPolicy
     """A policy for a scenario.
 
     Args:
-        name: One of :func:`names`, or ``"agent"`` with the `path` of its file.
+        name: One of :func:`names`, ``"agent"`` with the `path` of its file, or ``"package.module:Class"``.
         scenario: The tracking problem, as :func:`ikgym.scenarios.find` takes it. The policy is handed the scenario's
             model of the arm, not the arm itself.
-        **parameters: The policy's own, see its class.
+        **parameters: Those of the policy, see its class.
 
     Returns:
         The policy, with the `predict` of Stable-Baselines3.
@@ -197,23 +175,17 @@ def _entry_points() -> dict[str, str]:
     return {one.name: one.value.partition("[")[0].strip() for one in importlib.metadata.entry_points(group=GROUP)}
 
 
-def checked_class(kind: object, import_path: str | None = None) -> type[SolverPolicy]:
+def check_class(kind: object, import_path: str | None = None) -> type[SolverPolicy]:
     """The same class.
 
     Raises:
         InvalidInputError: It is none of policies, or is abstract.
     """
     if import_path is None:
-        import_path = place_of(kind) if isinstance(kind, type) else repr(kind)
+        import_path = import_path_of(kind) if isinstance(kind, type) else repr(kind)
     if not (isinstance(kind, type) and issubclass(kind, SolverPolicy)):
         raise InvalidInputError(f"Policy {import_path!r}: expected a class derived from SolverPolicy, got {kind!r}.")
     if inspect.isabstract(kind):
         missing = ", ".join(sorted(kind.__abstractmethods__))
         raise InvalidInputError(f"Policy {import_path!r}: the class lacks {missing}.")
     return kind
-
-
-def _checked(import_path: object) -> str:
-    if not isinstance(import_path, str) or not PLACE.fullmatch(import_path):
-        raise InvalidInputError(f"policy: expected 'package.module:Class', got {import_path!r}.")
-    return import_path

@@ -1,4 +1,4 @@
-"""Policies as text: ``"dls"``, ``"dls:damping=1e-2"``, ``"agent:PATH"``."""
+"""Policies as text: ``"dls"``, ``"dls:damping=1e-2"``, ``"agent:PATH"``, ``"package.module:Class:gain=0.5"``."""
 
 from __future__ import annotations
 
@@ -8,58 +8,43 @@ from typing import Any
 
 from baselines import registry
 from ikgym.exceptions import InvalidInputError
+from ikgym.registry import IMPORT_PATH
 from ikgym.validation import known_names
 
-#: A policy as text such as ``"dls:damping=1e-2"``, or its name and its parameters.
+#: A policy as text, or its name and its parameters.
 PolicySpec = str | tuple[str, Mapping[str, Any]]
 
 
 def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
-    """Name and parameters of a policy.
+    """Name or import path of a policy, and its parameters.
 
     Args:
-        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both; ``"agent:PATH"``, too. Values
-            are Python's literals; anything else is taken for plain text.
+        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both; ``"agent:PATH"``, too. Instead
+            of a name there may be an import path, ``"package.module:Class"``, which is not imported here. Values are
+            Python's literals; anything else is taken for plain text.
 
     Raises:
         UnknownNameError: There is no such policy or parameter.
         InvalidInputError: The text has another form, or names a parameter twice.
     """
     if isinstance(spec, str):
-        name, _, text = spec.partition(":")
-        name = name.strip()
-        alone, known = registry.get(name).positional, registry.get(name).parameter_names()
-        if alone is not None and text.strip() and text.partition("=")[0].strip() not in known:
-            parameters: dict[str, Any] = {alone: text.strip()}
+        name, colon, text = (part.strip() for part in spec.partition(":"))
+        attribute, more, rest = (part.strip() for part in text.partition(":"))
+        if not registry.known(name) and IMPORT_PATH.fullmatch(import_path := f"{name}:{attribute}"):
+            return import_path, parse_parameters(rest, f"policy {spec!r}") if more else {}
+        positional, known = registry.get(name).positional, registry.get(name).parameter_names()
+        if positional is not None and text and text.partition("=")[0].strip() not in known:
+            parameters: dict[str, Any] = {positional: text}
         else:
-            parameters = parse_parameters(text, f"policy {spec!r}") if ":" in spec else {}
+            parameters = parse_parameters(text, f"policy {spec!r}") if colon else {}
     elif isinstance(spec, tuple) and len(spec) == 2 and isinstance(spec[0], str) and isinstance(spec[1], Mapping):
-        name, parameters = spec[0], dict(spec[1])
+        name, parameters = spec[0].strip(), dict(spec[1])
+        if not registry.known(name) and IMPORT_PATH.fullmatch(name):
+            return name, parameters
     else:
         raise InvalidInputError(f"policy: expected 'name:parameter=value' or (name, parameters), got {spec!r}.")
     known_names(f"parameter of {name}", parameters, registry.get(name).parameter_names())
     return name, parameters
-
-
-def parse_place(spec: object) -> tuple[str, dict[str, Any]] | None:
-    """Place and parameters of a policy that is no registered one; None where the specification has another form.
-
-    Args:
-        spec: ``"package.module:Class"``, ``"package.module:Class:parameter=value,…"``, or a pair of the first and
-            parameters. Texts that begin with the name of a registered policy are none.
-
-    Raises:
-        InvalidInputError: The parameters have another form, or one is given twice.
-    """
-    text, given = spec if isinstance(spec, tuple) and len(spec) == 2 else (spec, None)
-    if not isinstance(text, str) or not isinstance(given, (Mapping, type(None))):
-        return None
-    module, _, rest = text.strip().partition(":")
-    attribute, more, parameters = rest.partition(":")
-    place = f"{module}:{attribute}"
-    if registry.known(module) or not registry.PLACE.fullmatch(place) or (more and given is not None):
-        return None
-    return place, (parse_parameters(parameters, f"policy {text!r}") if more else dict(given or {}))
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Any]:
@@ -83,7 +68,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Any]:
 
 
 def _split(text: str) -> list[str]:
-    """Parts between commas that stand in no bracket."""
+    """Parts between commas outside of brackets."""
     parts, depth = [""], 0
     for letter in text:
         depth += (letter in "([{") - (letter in ")]}")

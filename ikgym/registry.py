@@ -1,13 +1,50 @@
-"""A registry of named members, each made when first needed."""
+"""A registry of named members, each made when first needed, and objects by their import path."""
 
 from __future__ import annotations
 
+import importlib
+import re
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 
 Member = TypeVar("Member")
+
+#: The form of an import path, ``package.module:attribute``.
+IMPORT_PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
+
+
+def check_import_path(kind: str, path: object) -> str:
+    """A text in the form of an import path.
+
+    Raises:
+        InvalidInputError: It has another form; the message begins with the kind of object.
+    """
+    if not isinstance(path, str) or not IMPORT_PATH.fullmatch(path):
+        raise InvalidInputError(f"{kind}: expected 'package.module:attribute', got {path!r}.")
+    return path
+
+
+def import_object(kind: str, path: str) -> object:
+    """The object at an import path.
+
+    Raises:
+        InvalidInputError: The path has another form, the module cannot be imported, or has no such attribute; the
+            message begins with the kind of object.
+    """
+    module, _, attribute = check_import_path(kind, path).partition(":")
+    try:
+        found: object = importlib.import_module(module)
+    except Exception as e:  # whatever the code of others raises
+        fault = f"{type(e).__name__}: {e}"
+        raise InvalidInputError(f"{kind} {path!r}: {module} cannot be imported: {fault}.") from e
+    for name in attribute.split("."):
+        if not hasattr(found, name):
+            public = [other for other in dir(found) if not other.startswith("_")]
+            raise InvalidInputError(f"{kind} {path!r}: {UnknownNameError(f'attribute of {module}', name, public)}")
+        found = getattr(found, name)
+    return found
 
 
 class Registry(Generic[Member]):

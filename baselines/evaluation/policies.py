@@ -15,8 +15,9 @@ from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
 from baselines.policy.protocol import Policy
 from baselines.recording import Seeds
-from baselines.spec import PolicySpec, parse_place, parse_policy
+from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
+from ikgym.registry import import_object
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import offsets
 from ikgym.validation import known_names
@@ -88,7 +89,7 @@ class Specification:
             raise UnsuitedError(self.missing)
         if self.solver is not None:
             return self._bind_solver(self.solver, scenario, seeds)
-        model = registry.load(self.model) if isinstance(self.model, str) else self.model
+        model = import_object("policy", self.model) if isinstance(self.model, str) else self.model
         if isinstance(model, type) or not callable(getattr(model, "predict", None)):
             model = self._call(model, scenario)
         if isinstance(model, SolverPolicy):
@@ -195,19 +196,18 @@ def specification(item: Any, *, wrap: Wrap | None = None) -> Specification:
         return _of_class(item, {}, wrap)
     if isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], type) and isinstance(item[1], Mapping):
         return _of_class(item[0], item[1], wrap)
-    if (found := parse_place(item)) is not None:
-        import_path, parameters = found
-        content = registry.load(import_path)
-        if isinstance(content, type) and issubclass(content, SolverPolicy):
-            return _of_class(registry.resolve(import_path), parameters, wrap)
-        return Specification(import_path, import_path, parameters, wrap)
     if not isinstance(item, (str, tuple)):
         raise InvalidInputError(
             "policy: expected a name, 'package.module:Class', a class, or an object with the predict of "
             f"Stable-Baselines3, got {item!r}."
         )
     name, parameters = parse_policy(item)
-    return Specification(name, registry.get(name), parameters)
+    if registry.known(name):
+        return Specification(name, registry.get(name), parameters)
+    content = import_object("policy", name)
+    if isinstance(content, type) and issubclass(content, SolverPolicy):
+        return _of_class(content, parameters, wrap)
+    return Specification(name, name, parameters, wrap)
 
 
 def shown_preview(policy: Policy, preview: Preview | None) -> Preview:
@@ -242,12 +242,12 @@ def check_picklable(specifications: Iterable[Specification]) -> None:
 
 def _of_class(kind: type[Any], parameters: Mapping[str, Any], wrap: Wrap | None) -> Specification:
     if issubclass(kind, SolverPolicy):
-        name, kind = registry.name_of(kind), registry.checked_class(kind)
+        name, kind = registry.name_of(kind), registry.check_class(kind)
         known_names(f"parameter of {name}", parameters, kind.parameter_names())
         return Specification(name, kind, dict(parameters))
     if not callable(getattr(kind, "predict", None)):
         raise InvalidInputError(f"policy: expected a class with the predict of Stable-Baselines3, got {kind!r}.")
-    return Specification(registry.place_of(kind), kind, dict(parameters), wrap)
+    return Specification(registry.import_path_of(kind), kind, dict(parameters), wrap)
 
 
 def _registered(name: str) -> Specification:

@@ -315,7 +315,7 @@ def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
 def is_reference(policy: str) -> bool:
     """Whether a policy has privileged information, as far as it is known without importing code of others."""
     try:
-        kind = registry.get(policy) if registry.known(policy) else registry.imported(policy)
+        kind = registry.get(policy) if registry.known(policy) else registry.find_imported(policy)
     except IkgymError:
         return False
     return bool(getattr(kind, "reference", False))

@@ -11,7 +11,6 @@ is made in Python; :func:`find` takes all the ways to name one.
 from __future__ import annotations
 
 import functools
-import importlib
 import os
 import pathlib
 from collections.abc import Callable
@@ -19,10 +18,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ikgym import arms, problems
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.obstacles import Box
-from ikgym.registry import Registry
+from ikgym.registry import Registry, import_object
 from ikgym.scenarios import files
 from ikgym.scenarios.preview import Preview
 from ikgym.scenarios.reachability import Gap, gaps
@@ -165,24 +164,9 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
         if item.endswith(".toml"):
             return load(item)
         if ":" in item:
-            return _imported(item)
+            found = import_object("scenario", item)
+            return _registry.made(item, found if callable(found) else lambda: found)
     return get(item)
-
-
-def _imported(import_path: str) -> Scenario:
-    """The scenario ``"package.module:attribute"``."""
-    name, _, attribute = import_path.partition(":")
-    if not attribute.isidentifier() or not all(part.isidentifier() for part in name.split(".")):
-        raise InvalidInputError(f"scenario: expected 'package.module:attribute', got {import_path!r}.")
-    try:
-        module = importlib.import_module(name)
-    except Exception as error:  # whatever the code of others raises
-        fault = f"{type(error).__name__}: {error}"
-        raise InvalidInputError(f"Scenario {import_path!r}: {name} cannot be imported: {fault}") from error
-    if not hasattr(module, attribute):
-        raise UnknownNameError(f"attribute of {name}", attribute, [key for key in vars(module) if key[0] != "_"])
-    found = getattr(module, attribute)
-    return _registry.made(import_path, found if callable(found) else lambda: found)
 
 
 def seeds(split: str, episodes: int) -> tuple[int, ...]:

@@ -14,7 +14,8 @@ from baselines import registry
 from baselines.evaluate import evaluate
 from baselines.policy import Solution, SolverPolicy, statuses
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
-from ikgym.exceptions import InvalidInputError
+from baselines.spec import parse_policy
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.evaluation.planning import planned
 
 
@@ -114,7 +115,7 @@ class Unfinished(SolverPolicy):
     ("name", "place", "message"),
     [
         *(
-            ("mine", place, r"expected 'package\.module:Class', got")
+            ("mine", place, r"expected 'package\.module:attribute', got")
             for place in ("dls", "package.module:", ":Class", "a:b:c", "a b:C", 3)
         ),
         *((name, Still, "expected a name of letters, digits") for name in ("", "a b", ".a", 3)),
@@ -134,7 +135,7 @@ def test_what_is_refused_leaves_nothing_behind(name, place, message):
     ("content", "message"),
     [
         (None, "ModuleNotFoundError: No module named 'other_module'"),
-        ("x = 1", "has no attribute 'Policy'"),
+        ("x = 1", "no attribute of other_module 'Policy'"),
         ("class Policy(", "SyntaxError"),
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
         ("Policy = 3", "expected a class derived from SolverPolicy, got 3"),
@@ -149,6 +150,17 @@ def test_places_that_lead_nowhere(tmp_path, monkeypatch, content, message):
     with pytest.raises(InvalidInputError, match=message):
         baselines.get("mine")
     monkeypatch.delitem(sys.modules, "other_module", raising=False)
+
+
+def test_an_import_path_is_as_good_as_a_name():
+    path = f"{DampedLeastSquares.__module__}:{DampedLeastSquares.__qualname__}"
+    assert parse_policy(f"{path}:gain=0.5") == parse_policy((path, {"gain": 0.5})) == (path, {"gain": 0.5})
+    assert baselines.make(path, "zhang3-helix", gain=0.5).parameters["gain"] == 0.5
+    assert isinstance(baselines.make("smoothed", "varga7-fast", policy=path).inner, DampedLeastSquares)
+    with pytest.raises(UnknownNameError, match="Did you mean 'gain'"):
+        baselines.make(path, "zhang3-helix", gian=0.5)
+    with pytest.raises(InvalidInputError, match=r"no attribute of .* 'Damped'"):
+        baselines.get(f"{DampedLeastSquares.__module__}:Damped")
 
 
 def test_packages_of_others_bring_policies(entry_points):
@@ -166,10 +178,10 @@ def test_a_bad_entry_point_takes_nobody_else_away(entry_points):
     assert baselines.get("theirs").__name__ == "Still"
     with pytest.raises(InvalidInputError, match="No module named 'not_installed'"):
         baselines.get("broken")
-    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:Class', got '::'"):
+    with pytest.raises(InvalidInputError, match=r"expected 'package\.module:attribute', got '::'"):
         evaluate("zhang3-helix", "nonsense", steps=2)
     plan = planned("zhang3-helix", "all", steps=2)
     assert {"dls", "theirs"} <= {job.policy for job in plan.jobs}
     reasons = {one.policy: one.reason for one in plan.skipped}
     assert "No module named 'not_installed'" in reasons["broken"]
-    assert "expected 'package.module:Class'" in reasons["nonsense"]
+    assert "expected 'package.module:attribute'" in reasons["nonsense"]
