@@ -31,13 +31,14 @@ from baselines.recording import Seeds
 from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import Frozen
 from ikgym.scenarios import Preview, Scenario, imperfect
 from ikgym.scenarios.preview import offsets
-from ikgym.validation import whole_number
+from ikgym.validation import Bounds
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(Frozen):
     """Options of :func:`baselines.evaluate.evaluate` and of the command.
 
     Names may be given as one text or as several; `out` may be text, too.
@@ -53,12 +54,12 @@ class Options:
     """Policies as :func:`baselines.evaluation.policies.specifications` takes them."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets, which define the episodes, instead of scenarios, episodes, split, steps and noise seeds."""
-    episodes: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    episodes: Annotated[int, tyro.conf.arg(metavar="N"), Bounds(at_least=1)] = 1
     """Episodes of each random scenario: the first seeds of the split. Other scenarios are the same at every reset and
     have one episode, with seed 0."""
     split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "test"
     """Seeds of random scenarios: train, validation or test."""
-    steps: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    steps: Annotated[int | None, tyro.conf.arg(metavar="N"), Bounds(at_least=1)] = None
     """Most steps of an episode, for trials. The scenario's own number if left out."""
     preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
     """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
@@ -66,7 +67,7 @@ class Options:
     wrap: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
     trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
-    timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all")] = 1
+    timed: Annotated[int | Literal["all"], tyro.conf.arg(metavar="N|all"), Bounds(at_least=1)] = 1
     """Episodes of each policy in each scenario that are played one by one and timed. The others are played together,
     which is faster, and have no times."""
     workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -85,7 +86,7 @@ class Options:
     """Write the joint motion of each episode: csv; joint-trajectory, a ROS 2 message as JSON; mcap, it for rosbag2."""
     accelerations: bool = False
     """Write accelerations into these files, too: controllers then interpolate by quintics, else cubically."""
-    noise_seeds: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    noise_seeds: Annotated[int, tyro.conf.arg(metavar="N"), Bounds(at_least=1, at_most=10_000)] = 1
     """Times that each episode is played, each time with other noise in sensors and drives, the same for all policies.
     Episodes without noise are played once. The cost of an episode is the geometric mean over its noise seeds."""
     pairs: bool = False
@@ -102,23 +103,18 @@ class Options:
     """Show a progress bar on stderr."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("test_sets", "export", "severities"):
             value = getattr(self, name)
-            object.__setattr__(self, name, (value,) if isinstance(value, (str, float)) else tuple(dict.fromkeys(value)))
+            self._settle(**{name: (value,) if isinstance(value, (str, float)) else tuple(dict.fromkeys(value))})
         if self.out is not None:
-            object.__setattr__(self, "out", pathlib.Path(self.out))
+            self._settle(out=pathlib.Path(self.out))
         if self.export:
             from baselines.evaluation.export import check_formats
 
             check_formats(self.export)
             if self.out is None:
                 raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
-        whole_number("episodes", self.episodes, at_least=1)
-        whole_number("noise_seeds", self.noise_seeds, at_least=1, at_most=10_000)
-        if self.steps is not None:
-            whole_number("steps", self.steps, at_least=1)
-        if self.timed != "all":
-            whole_number("timed", self.timed, at_least=1)
         if self.preview is not None:
             offsets(self.preview)
         Workers(self.workers, self.cluster)
