@@ -46,12 +46,20 @@ class Arms:
         # First, since it checks the memory.
         self._simulator = Simulator(self.scenario, rows, preview, commands=commands)
         self.lost_distance = checked_distance(lost_distance)
-        self._pictures: list[Pictures] = []
+        self._renderers: list[Renderer] = []
         if render_mode is not None:
-            from ikgym.rendering.pictures import Pictures  # matplotlib is slow to import
+            from ikgym.rendering import Renderer  # matplotlib is slow to import
 
-            self._pictures = [Pictures(self._simulator, row, render_mode) for row in range(rows or 1)]
+            self._renderers = [Renderer(self.scenario, render_mode) for _ in range(rows or 1)]
         return observation_space(self.scenario, preview, commands), action_space(self.scenario)
+
+    def _record(self, row: int, position_error: float, orientation_error: float, *, begins: bool = False) -> None:
+        """Records the state of a row, which may begin an episode, for its pictures; errors in [m] and [rad]."""
+        simulator, renderer = self._simulator, self._renderers[row]
+        if begins:
+            renderer.begin(simulator.nominal_positions(row))
+        step, q = int(simulator.steps_made[row]), simulator.true_q[row]
+        renderer.add(step, q, position_error, orientation_error, simulator.obstacles(row))
 
     @property
     def preview(self) -> tuple[int, ...]:
@@ -238,8 +246,8 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
         self._ended = True  # until it is certain that the arm touches nothing
         out = self._simulator.observe()
         self._step, self._ended = int(self._simulator.steps_made[0]), False
-        for pictures in self._pictures:
-            pictures.record(float(out.position_error[0]), float(out.orientation_error[0]), begins=True)
+        if self._renderers:
+            self._record(0, float(out.position_error[0]), float(out.orientation_error[0]), begins=True)
         return observation(out, 0), {"context": self.context} if self.context.size else {}
 
     def step(self, action: npt.ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -274,8 +282,8 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
             cost += met[2]
         if self.scenario.proximity is not None:
             info["proximity_cost"] = met[2]
-        for pictures in self._pictures:
-            pictures.record(position, orientation)
+        if self._renderers:
+            self._record(0, position, orientation)
         ends, over = self.lost_distance is not None, self._step == self._steps
         lost = ends and (position > self.lost_distance or bool(met and met[1] > 0.0))  # type: ignore[operator]
         self._ended = lost or over
@@ -290,14 +298,14 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
         Raises:
             ResetNeededError: There is no episode yet.
         """
-        if not self._pictures:
+        if not self._renderers:
             gym.logger.warn("render() draws nothing without a render_mode; give one to gym.make().")
             return None
         if self._step < 0:
             raise ResetNeededError("render() needs an episode: call reset() first.")
-        return self._pictures[0].draw()
+        return self._renderers[0].draw()
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        for pictures in self._pictures:
-            pictures.close()
+        for renderer in self._renderers:
+            renderer.close()

@@ -138,7 +138,7 @@ class RedundantIKVectorEnv(
                 self._generators[row], self._seeds[row] = seeding.np_random(one)
         self._begin(mask, **chosen)
         out = self._simulator.observe()
-        self._record(out, begun=mask, rows=mask)
+        self._record_rows(out, begun=mask, rows=mask)
         return observation(out), contexts(self.context, mask)
 
     def step(self, actions: npt.ArrayLike) -> tuple[Observation, FloatArray, BoolArray, BoolArray, Infos]:
@@ -175,7 +175,7 @@ class RedundantIKVectorEnv(
             self._begin(beginning)
             self._simulator.observe(beginning, out)
             infos.update(contexts(self.context, beginning))
-        self._record(out, begun=beginning, rows=self._begun)
+        self._record_rows(out, begun=beginning, rows=self._begun)
         self._ended = np.zeros_like(ended) if same_step else ended
         return observation(out), rewards, lost, over, infos
 
@@ -190,7 +190,7 @@ class RedundantIKVectorEnv(
             return None
         if not self._begun.all():
             raise ResetNeededError("render() needs episodes: call reset() first.")
-        return tuple(one.draw() for one in self._pictures)
+        return tuple(renderer.draw() for renderer in self._renderers)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of each row: `scenario`, `np_random`, spaces and others.
@@ -228,9 +228,9 @@ class RedundantIKVectorEnv(
         self._begun |= mask
         self._ended = self._ended & ~mask
 
-    def _record(self, out: Outcome, *, begun: BoolArray, rows: BoolArray) -> None:
+    def _record_rows(self, out: Outcome, *, begun: BoolArray, rows: BoolArray) -> None:
         """Records the states of some rows for their pictures, if there are some; those that have begun start anew."""
-        for row, pictures in enumerate(self._pictures):
-            if rows[row]:
+        if self._renderers:
+            for row in np.flatnonzero(rows).tolist():
                 errors = float(out.position_error[row]), float(out.orientation_error[row])
-                pictures.record(*errors, begins=bool(begun[row]))
+                self._record(row, *errors, begins=bool(begun[row]))

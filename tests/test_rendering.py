@@ -10,7 +10,7 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 
 import ikgym
-from ikgym.rendering import Renderer, renderer, scene, style
+from ikgym.rendering import Renderer, picture, renderer, style
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 from tests.bodied import crowd
 
@@ -40,7 +40,7 @@ def move(env, fraction=0.5):
 
 
 def renderer_of(env):
-    return env.unwrapped._pictures[0]
+    return env.unwrapped._renderers[0]
 
 
 def artist(env, name):
@@ -54,13 +54,13 @@ def blank(picture):
 
 def count_paintings(monkeypatch):
     painted = []
-    paint = scene.Scene.paint
+    paint = picture.Picture.paint
 
     def counted(self, *, anew):
         painted.append(anew)
         paint(self, anew=anew)
 
-    monkeypatch.setattr(scene.Scene, "paint", counted)
+    monkeypatch.setattr(picture.Picture, "paint", counted)
     return painted
 
 
@@ -84,12 +84,13 @@ def test_a_picture_changes_with_the_arm_and_only_with_it():
     np.testing.assert_array_equal(env.render(), pictures[-1])
     for before, after in itertools.pairwise(pictures):
         assert (before != after).any()
-    renderer_of(env)._scene._background = None  # all is drawn anew
+    renderer_of(env)._picture._background = None  # all is drawn anew
     np.testing.assert_array_equal(env.render(), pictures[-1])
 
 
-def test_a_second_episode_looks_as_if_it_were_the_first():
-    env, fresh = environment("varga7-random"), environment("varga7-random")
+@pytest.mark.parametrize("name", ["varga7-random", "panda-shelf"])
+def test_a_second_episode_looks_as_if_it_were_the_first(name):
+    env, fresh = environment(name), environment(name)
     for _ in range(2):
         move(env, 1.0)
         env.render()
@@ -260,7 +261,7 @@ def test_bodies_obstacles_and_the_closest_pair_are_drawn_where_touching_matters(
     bodies, obstacles, pair = (np.array(artist(env, name).get_data_3d()) for name in LINES)
     distance = np.linalg.norm(pair[:, 0] - pair[:, 1])
     assert distance == pytest.approx(info["clearance"], abs=1e-12)
-    assert f"clearance {1e3 * distance:.1f} mm" in renderer_of(env)._scene._heading.get_text()
+    assert f"clearance {1e3 * distance:.1f} mm" in renderer_of(env)._picture._heading.get_text()
     moved = np.nan_to_num(np.abs(obstacles - before)).max(axis=0) > 0.0
     assert 0.1 < moved.mean() < 0.5  # the ball alone
     middle = env.unwrapped.scenario.arm.joint_points(env.unwrapped._simulator.true_q[0])[3, 1]
@@ -273,4 +274,4 @@ def test_nothing_of_it_is_drawn_elsewhere():
         env.reset(seed=0)
         env.render()
         assert not renderer_of(env).figure.findobj(lambda a: a.get_gid() in LINES)
-        assert "clearance" not in renderer_of(env)._scene._heading.get_text()
+        assert "clearance" not in renderer_of(env)._picture._heading.get_text()

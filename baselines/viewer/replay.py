@@ -18,8 +18,8 @@ from ikgym import scenarios
 from ikgym.arms import Arm
 from ikgym.arms.inverse import LENGTH_OF_RADIAN
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.rotations import geodesic_angle
 from ikgym.obstacles.solids import solids_of
+from ikgym.rendering.scene import Scene
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
@@ -61,21 +61,19 @@ class Stage:
         shift = shift or SLOW * length * whole.dt
         return cls(shown, seed, start, frames[: shown.steps + 1], (shift, shift / (LENGTH_OF_RADIAN * length)))
 
-    def errors(self, q: FloatArray, frame: FloatArray) -> tuple[float, float]:
-        """Distance in [m] and angle in [rad] of the tool at q (n,) from a frame (12,); NaN without an orientation."""
-        rotation, position = self.scenario.arm.forward(q)
-        oriented = self.scenario.task.has_orientation
-        angle = geodesic_angle(frame[:9].reshape(3, 3), rotation) if oriented else np.nan
-        return float(np.linalg.norm(frame[9:] - position)), float(angle)
-
     @functools.cached_property
     def boxes(self) -> FloatArray:
         """The obstacles after 0, 1, … steps, once if none moves, see :func:`ikgym.obstacles.solids.solids_of`."""
         scenario = self.scenario
         return solids_of(scenario.obstacles_of(self.seed), scenario.times(scenario.steps + 1), scenario.model)
 
+    def scene(self, q: FloatArray, step: int, target: FloatArray | None = None) -> Scene:
+        """An arm at q in [rad] or [m] (n,) after a number of steps, with the reference or another target (12,)."""
+        reference = self.frames[step] if target is None else target
+        return Scene(self.scenario, q, reference, self.obstacles(step))
+
     def obstacles(self, step: int) -> FloatArray:
-        """The obstacles after so many steps. Shape (o, 16)."""
+        """The obstacles after a number of steps. Shape (o, 16)."""
         now: FloatArray = self.boxes[min(step, len(self.boxes) - 1)]
         return now
 

@@ -20,9 +20,9 @@ import websockets.asyncio.server
 from viser.transforms import SO3
 
 from baselines.evaluation.table import escaped
-from baselines.viewer.arms import Shape
+from baselines.viewer.drawing import Drawing
+from baselines.viewer.meshes import Shape
 from baselines.viewer.readings import slider_range
-from baselines.viewer.scene import Scene
 from baselines.viewer.session import Mode, Session, Shown
 from ikgym.exceptions import InvalidInputError
 
@@ -50,13 +50,13 @@ class Viewer:
         self.session, gui, stage = session, server.gui, session.stage
         # Requests of browsers, which come in threads of the server.
         self._requests: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
-        self.scene = Scene(server, session, shapes)
-        self.scene.target.on_update(self._dragged)
-        server.on_client_connect(lambda client: self.scene.look(client.camera))
+        self.drawing = Drawing(server, session, shapes)
+        self.drawing.target.on_update(self._dragged)
+        server.on_client_connect(lambda client: self.drawing.look(client.camera))
         gui.add_markdown(f"**{escaped(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
         if session.has_bodies:
             self.bodies = gui.add_checkbox("bodies and obstacles", stage.scenario.collides)
-            self._on_user([self.bodies], self.scene.show_bodies)
+            self._on_user([self.bodies], self.drawing.show_bodies)
         with gui.add_folder("Episode"):
             self.play = gui.add_button("Play")
             self.time = gui.add_slider("time [s]", 0.0, session.duration, session.duration / 1000.0, 0.0)
@@ -87,7 +87,7 @@ class Viewer:
                 self._requests.get_nowait()()
         self.session.advance(seconds)
         shown = self.session.shown()
-        self.scene.show(shown)
+        self.drawing.show(shown)
         self._since_reading += seconds
         if self._since_reading >= 1.0 / READINGS:
             self._since_reading = 0.0
@@ -101,12 +101,12 @@ class Viewer:
         if session.mode is Mode.PLAY:
             _set(self.time, session.time)
         if session.mode is not Mode.HAND:
-            for slider, coordinate in zip(self.joints, shown[0].q.tolist(), strict=True):
+            for slider, coordinate in zip(self.joints, shown[0].scene.q.tolist(), strict=True):
                 _set(slider, min(max(coordinate, slider.min), slider.max))
 
     def _dragged(self, _: object) -> None:
         # Read at once: the scene may move the target before the request is handled.
-        target = self.scene.target
+        target = self.drawing.target
         rotation, position = SO3(target.wxyz).normalize().as_matrix(), np.array(target.position)
         self._requests.put(lambda: self.session.aim(np.append(rotation, position)))
 

@@ -14,7 +14,7 @@ from baselines.status import Status
 from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
 from baselines.viewer.replay import Stage, play_all
-from ikgym.obstacles.solids import Closest, closest
+from ikgym.rendering.scene import Scene
 from ikgym.validation import FloatArray
 
 #: The status of a policy that cannot follow a target.
@@ -35,13 +35,12 @@ class Shown(NamedTuple):
     """The arm of one policy at one time."""
 
     policy: str
-    q: FloatArray  # joint coordinates in [rad] or [m]. Shape (n,)
+    scene: Scene  # the arm, its surroundings and its target
     position_error: float  # distance from the reference in [m], NaN without one
     orientation_error: float  # angle in [rad], NaN also if the task has no orientation
     cost: float  # accumulated cost of the episode, NaN outside of it
     status: str  # status of the policy's last step
     reading: Reading  # manipulability and limits
-    closest: Closest  # the closest pair of bodies and obstacles
 
 
 class Session:
@@ -75,11 +74,6 @@ class Session:
         scenario = self.stage.scenario
         return bool(len(scenario.arm.bodies) or scenario.obstacles)
 
-    @property
-    def obstacles(self) -> FloatArray:
-        """The obstacles now; where the episode was left, they stand still. Shape (o, 16)."""
-        return self.stage.obstacles(self.step)
-
     def place(self, q: FloatArray) -> None:
         """Puts all arms at joint coordinates in [rad] or [m], cut to the limits, and the target at their tool. (n,)."""
         arm = self.stage.scenario.arm
@@ -90,7 +84,7 @@ class Session:
     def aim(self, target: FloatArray) -> None:
         """Moves the target; the arms follow it from where they are."""
         if self.mode is not Mode.FOLLOW:
-            self._leave(Mode.FOLLOW, self.reference, [one.q for one in self.shown()])
+            self._leave(Mode.FOLLOW, self.reference, [shown.scene.q for shown in self.shown()])
         self._approach.aim(target)
 
     def toggle(self) -> None:
@@ -147,38 +141,34 @@ class Session:
         self._due -= due
 
     def _shown(self, number: int) -> Shown:
-        replay, following = self.replays[number], self._followers[number]
-        position, orientation, cost = np.nan, np.nan, np.nan
+        stage, replay, following = self.stage, self.replays[number], self._followers[number]
         if self.mode is Mode.PLAY:
             k = self.step
-            q, status = replay.q[k], Status(int(replay.statuses[k])).label
-            position, orientation, cost = replay.position_error[k], replay.orientation_error[k], replay.cost[k]
-        elif following is None:
-            q, status = self._q[number], PLAYS_ONLY
+            scene, status = stage.scene(replay.q[k], k), Status(int(replay.statuses[k])).label
+            errors, cost = (float(replay.position_error[k]), float(replay.orientation_error[k])), float(replay.cost[k])
         else:
-            q, status = following.q, following.status
-            position, orientation = self.stage.errors(q, self.reference)
-        scenario = self.stage.scenario
-        pair = closest(scenario.arm, q[None], self.obstacles[None], scenario.surroundings.checked)
-        errors = float(position), float(orientation)
-        return Shown(replay.policy, q, *errors, float(cost), status, self._reader.read(q), pair)
+            q, status = (self._q[number], PLAYS_ONLY) if following is None else (following.q, following.status)
+            scene, errors, cost = stage.scene(q, self.step, self.reference), (np.nan, np.nan), np.nan
+            if following is not None:
+                errors = scene.errors
+        return Shown(replay.policy, scene, *errors, cost, status, self._reader.read(scene.q))
 
-    def _readings(self, one: Shown) -> str:
+    def _readings(self, shown: Shown) -> str:
         """A heading and a list."""
-        arm, reading = self.stage.scenario.arm, one.reading
-        status = "" if one.status == Status.UNKNOWN.label else f": {escaped(one.status)}"
-        lines = [f"**{escaped(one.policy)}**{status}\n"]
-        errors = [(one.position_error, "mm"), (one.orientation_error, "mrad")]
-        if found := [f"{1e3 * error:.3g} {unit}" for error, unit in errors if np.isfinite(error)]:
-            lines.append(f"- error {', '.join(found)}")
+        scenario, reading, scene = self.stage.scenario, shown.reading, shown.scene
+        status = "" if shown.status == Status.UNKNOWN.label else f": {escaped(shown.status)}"
+        lines = [f"**{escaped(shown.policy)}**{status}\n"]
+        errors = [(shown.position_error, "mm"), (shown.orientation_error, "mrad")]
+        if texts := [f"{1e3 * error:.3g} {unit}" for error, unit in errors if np.isfinite(error)]:
+            lines.append(f"- error {', '.join(texts)}")
         lines.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
         joint = int(np.argmin(reading.margins))
         if np.isfinite(reading.margins[joint]):
-            margin = f"{reading.margins[joint]:.3g} {'m' if arm.prismatic[joint] else 'rad'}"
-            lines.append(f"- {escaped(arm.joint_names[joint])} is {margin} from its limit")
-        if self.stage.scenario.collides and np.isfinite(one.closest.distances[0]):
-            pair = self.stage.scenario.pair_names(one.closest.pairs[0].tolist())
-            lines.append(f"- {1e3 * one.closest.distances[0]:.1f} mm between {' and '.join(map(escaped, pair))}")
-        if np.isfinite(one.cost):
-            lines.append(f"- cost so far {one.cost:.4g}")
+            margin = f"{reading.margins[joint]:.3g} {'m' if scenario.arm.prismatic[joint] else 'rad'}"
+            lines.append(f"- {escaped(scenario.arm.joint_names[joint])} is {margin} from its limit")
+        if np.isfinite(scene.clearance):
+            pair = scenario.pair_names(scene.closest.pairs[0].tolist())
+            lines.append(f"- {1e3 * scene.clearance:.1f} mm between {' and '.join(map(escaped, pair))}")
+        if np.isfinite(shown.cost):
+            lines.append(f"- cost so far {shown.cost:.4g}")
         return "\n".join(lines)

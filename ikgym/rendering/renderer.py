@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.registry import backend_registry
 from matplotlib.figure import Figure
 
+from ikgym.rendering.picture import Picture
 from ikgym.rendering.scene import Scene
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -37,31 +38,29 @@ class Renderer:
     def __init__(self, scenario: Scenario, mode: str, *, title: str | None = None, width: int = WIDTH) -> None:
         self._scenario, self._human, self._dpi = scenario, mode == "human", DPI * width / WIDTH
         self._title = scenario.name if title is None else title
-        self._scene: Scene | None = None
+        self._picture: Picture | None = None
         self._in_window = False
-        self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in the episode's own
+        self._shown_at = self._shown = -math.inf  # the last picture, in wall time and in that of the episode
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the figure: a copy keeps the episode and draws on its own figure."""
-        return {**self.__dict__, "_scene": None, "_in_window": False, "_staged": False}
+        """Everything except the figure: a copy keeps the episode and draws on a new figure."""
+        return {**self.__dict__, "_picture": None, "_in_window": False, "_begun": False}
 
     @property
     def figure(self) -> Figure | None:
         """The figure; None before the first picture, and after :meth:`close`."""
-        return None if self._scene is None else self._scene.figure
+        return None if self._picture is None else self._picture.figure
 
     def begin(self, nominal: FloatArray) -> None:
         """Begins an episode with its nominal tool points in [m], one a step, and forgets the one before."""
         self._nominal, states = nominal.copy(), len(nominal)
-        self._q, self._tool = np.empty((states, self._scenario.joints)), np.empty((states, 3))
-        self._time, self._errors = np.empty(states), np.empty((states, 2))
-        self._states, self._step = 0, 0
-        self._staged = False  # whether the scene is set for this episode
+        self._path, self._time, self._errors = np.empty((states, 3)), np.empty(states), np.empty((states, 2))
+        self._states, self._begun = 0, False  # whether the picture shows this episode
 
     def add(
         self, step: int, q: FloatArray, position_error: float, orientation_error: float, boxes: FloatArray | None = None
     ) -> None:
-        """Records a state without drawing; at most steps + 1 states an episode.
+        """Records a state, which is drawn in a window; at most steps + 1 states an episode.
 
         Args:
             step: Steps made in the episode.
@@ -70,10 +69,14 @@ class Renderer:
             orientation_error: In [rad]; ignored where the task has no orientation.
             boxes: The obstacles as they are now; None for those at the start. Shape (o, 16).
         """
-        k, self._step, self._boxes = self._states, step, boxes
-        self._rotation, self._tool[k] = self._scenario.arm.forward(q)
-        self._q[k], self._time[k], self._errors[k] = q, step * self._scenario.dt, (position_error, orientation_error)
-        self._states = k + 1
+        k, boxes = self._states, self._scenario.surroundings.boxes if boxes is None else boxes
+        self._scene = Scene(self._scenario, q.copy(), self._nominal[step], boxes.copy())
+        if k == 0:
+            self._start = self._scene
+        self._path[k], self._time[k] = self._scene.tool[1], step * self._scenario.dt
+        self._errors[k], self._states = (position_error, orientation_error), k + 1
+        if self._human:
+            self.draw()
 
     def draw(self) -> npt.NDArray[np.uint8] | None:
         """Draws the last recorded state, and the path to it.
@@ -86,23 +89,18 @@ class Renderer:
         """
         if self._human and not self._due():
             return None
-        if self._scene is None:
+        if self._picture is None:
             figure = self._window() if self._human else _in_memory(self._dpi)
-            self._scene = Scene(figure, self._scenario, self._title)
-            self._staged = False
-        scene, arm, k = self._scene, self._scenario.arm, self._states
-        if anew := not self._staged:
-            start = np.vstack([arm.joint_points(self._q[0]).reshape(-1, 3), self._tool[:1]])
-            scene.set_stage(self._nominal, start, 0.08 * arm.reach(self._q[0]), self._boxes)
-            self._staged = True
-        scene.set_arm(arm.joint_points(self._q[k - 1]), self._rotation, self._tool[:k], self._nominal[self._step])
-        scene.set_solids(self._q[k - 1], self._boxes)
-        anew |= scene.set_errors(self._time[:k], self._errors[:k])
-        scene.paint(anew=anew)
+            self._picture, self._begun = Picture(figure, self._scenario, self._title), False
+        if not self._begun:
+            self._picture.begin(self._start, self._nominal)
+            self._begun = True
+        k = self._states
+        self._picture.show(self._scene, self._path[:k], self._time[:k], self._errors[:k])
         if self._human:
             self._shown_at, self._shown = clock.perf_counter(), self._time[k - 1]
             return None
-        return scene.pixels()
+        return self._picture.pixels()
 
     def close(self) -> None:
         """Closes the window, if there is one; closing twice is allowed."""
@@ -110,7 +108,7 @@ class Renderer:
             import matplotlib.pyplot as plt
 
             plt.close(self.figure)
-        self._scene, self._in_window = None, False
+        self._picture, self._in_window = None, False
 
     def _due(self) -> bool:
         """Whether it is time for a picture; in a window, waits for it where the episode runs ahead."""

@@ -91,7 +91,7 @@ def test_only_regular_files_of_a_bounded_size_are_opened(name, kind, tmp_path):
         message = "expected at most [0-9]+ bytes, got 1099511627776"
     read = READERS.get(name)
     if read is None:  # what the viewer shows
-        read = functools.partial(pytest.importorskip("baselines.viewer.arms").read_urdf, arm=arms.get("panda"))
+        read = functools.partial(pytest.importorskip("baselines.viewer.meshes").read_urdf, arm=arms.get("panda"))
     with pytest.raises(IkgymError, match=f"Cannot read .*{name}: ({message})"):
         read(file)
 

@@ -64,7 +64,7 @@ def meshes(arm: Arm, file: pathlib.Path | None) -> Any:
     source = arm.urdf.file if file is None and arm.urdf is not None else file
     if source is None:
         return None
-    from baselines.viewer.arms import read_urdf
+    from baselines.viewer.meshes import read_urdf
 
     try:
         return read_urdf(source, arm)

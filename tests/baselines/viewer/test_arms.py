@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.cli.commands.view import meshes
+from baselines.cli.commands import view
 from baselines.viewer.readings import AT, FREE, NEAR, Reader, slider_range
 from baselines.viewer.replay import size
 from ikgym.exceptions import InvalidInputError
@@ -15,7 +15,8 @@ from ikgym.exceptions import InvalidInputError
 pytest.importorskip("yourdfpy")
 trimesh = pytest.importorskip("trimesh")
 transforms = pytest.importorskip("viser.transforms")
-arms = pytest.importorskip("baselines.viewer.arms")
+meshes = pytest.importorskip("baselines.viewer.meshes")
+drawing = pytest.importorskip("baselines.viewer.drawing")
 
 JOINTS = ("shoulder", "elbow")
 
@@ -61,7 +62,7 @@ def test_frames_of_joints_are_those_of_the_arm(server):
     for name in ("planar2", "varga7", "tiago"):
         arm = ikgym.arms.get(name)
         q = np.random.default_rng(0).uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0))
-        drawn = arms.DrawnArm(server, f"/{name}", arm, FREE)
+        drawn = drawing.DrawnArm(server, f"/{name}", arm, FREE)
         drawn.show(q, read(arm, q))
         for joint, point in enumerate(arm.joint_points(q)[:, 1]):
             # viser leaves out motion that it takes for none.
@@ -70,7 +71,7 @@ def test_frames_of_joints_are_those_of_the_arm(server):
 
 
 def test_cylinders_have_the_colours_of_the_readings(arm, server):
-    drawn = arms.DrawnArm(server, "/root", arm, FREE)
+    drawn = drawing.DrawnArm(server, "/root", arm, FREE)
     drawn.show(np.array([0.95, 1.0]), read(arm, np.array([0.95, 1.0])))
     assert [tuple(joint.color) for joint in drawn._joints] == [NEAR, AT]
     assert tuple(drawn._tool.color) != AT
@@ -93,8 +94,8 @@ def test_manipulability_is_the_root_of_the_determinant_and_sliders_go_to_the_lim
 
 
 def test_meshes_move_with_the_arm(arm, server, tmp_path):
-    shapes, q = arms.read_urdf(urdf(tmp_path), arm), np.array([0.3, 0.5])
-    drawn = arms.DrawnArm(server, "/root", arm, FREE, shapes)
+    shapes, q = meshes.read_urdf(urdf(tmp_path), arm), np.array([0.3, 0.5])
+    drawn = drawing.DrawnArm(server, "/root", arm, FREE, shapes)
     drawn.show(q, read(arm, q))
     assert [shape.frame for shape in shapes] == [1, 2]
     for shape, joint in zip(shapes, arm.joint_points(q)[:, 1], strict=True):
@@ -146,20 +147,20 @@ def test_other_files_are_refused(arm, tmp_path):
         (lambda: text(urdf(tmp_path), "<robot", "<!DOCTYPE x><robot"), "no DOCTYPE"),
     ):
         with pytest.raises(InvalidInputError, match=message):
-            arms.read_urdf(file(), arm)
+            meshes.read_urdf(file(), arm)
 
 
 def test_all_meshes_together_are_bounded(arm, tmp_path, monkeypatch):
     size = (urdf(tmp_path).parent / "link.stl").stat().st_size
-    monkeypatch.setattr(arms, "MOST_BYTES", 2 * size)
-    assert len(arms.read_urdf(tmp_path / "two.urdf", arm)) == 2
-    monkeypatch.setattr(arms, "MOST_BYTES", 2 * size - 1)
+    monkeypatch.setattr(meshes, "MOST_BYTES", 2 * size)
+    assert len(meshes.read_urdf(tmp_path / "two.urdf", arm)) == 2
+    monkeypatch.setattr(meshes, "MOST_BYTES", 2 * size - 1)
     with pytest.raises(InvalidInputError, match=f"link.stl: expected at most {size - 1} bytes, got {size}"):
-        arms.read_urdf(tmp_path / "two.urdf", arm)
+        meshes.read_urdf(tmp_path / "two.urdf", arm)
 
 
 def test_an_arm_from_a_file_is_shown_with_its_meshes_if_there_are_any(tmp_path, capsys):
     pytest.importorskip("pinocchio")
-    assert len(meshes(ikgym.arms.from_urdf(urdf(tmp_path)), None)) == 2
-    assert meshes(ikgym.arms.from_urdf(urdf(tmp_path, shape="")), None) is None
+    assert len(view.meshes(ikgym.arms.from_urdf(urdf(tmp_path)), None)) == 2
+    assert view.meshes(ikgym.arms.from_urdf(urdf(tmp_path, shape="")), None) is None
     assert "Cylinders are shown: urdf:" in capsys.readouterr().err

@@ -22,7 +22,7 @@ def test_bodies_obstacles_and_the_line_are_where_the_kernels_have_them(viewer):
     session = viewer.session
     session.scrub(0.05)
     viewer.tick(1.0)
-    (drawn,), (arm,), scenario = viewer.scene._bodies, viewer.scene._arms, session.stage.scenario
+    (drawn,), (arm,), scenario = viewer.drawing._bodies, viewer.drawing._arms, session.stage.scenario
     q, boxes = session.replays[0].q[session.step], scenario.obstacle_rows(61)[session.step]
     found = closest(scenario.arm, q[None], boxes[None], scenario.surroundings.checked)
     for number, link in enumerate(scenario.arm.bodies.links):
@@ -37,11 +37,11 @@ def test_bodies_obstacles_and_the_line_are_where_the_kernels_have_them(viewer):
 
 
 def test_they_are_switched_off_and_on(viewer):
-    (drawn,) = viewer.scene._bodies
+    (drawn,) = viewer.drawing._bodies
     handles = [*drawn._bodies, *drawn._obstacles, drawn._line, drawn._distance]
     assert viewer.bodies.value
     for on in (False, True):
-        viewer.scene.show_bodies(on)
+        viewer.drawing.show_bodies(on)
         viewer.tick(1.0)
         assert [handle.visible for handle in handles] == [on] * len(handles)
 
@@ -49,13 +49,13 @@ def test_they_are_switched_off_and_on(viewer):
 def test_without_collisions_they_are_off_and_without_bodies_not_there(server):
     off = servers.Viewer(server, Session(Stage.of(crowd(steps=5).replace(collisions=False)), ["dls"]))
     assert not off.bodies.value
-    assert not off.scene._bodies[0]._bodies[0].visible
+    assert not off.drawing._bodies[0]._bodies[0].visible
     assert " between " not in off.session.text(off.session.shown())
     server.scene.reset()
     server.gui.reset()
     none = servers.Viewer(server, Session(Stage.of("varga7-fast", steps=5), ["dls"]))
     assert not hasattr(none, "bodies")
-    assert none.scene._bodies == []
+    assert none.drawing._bodies == []
 
 
 def test_an_arm_that_is_stopped_is_shown_at_its_obstacle(server):

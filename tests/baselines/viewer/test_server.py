@@ -72,7 +72,7 @@ def wait_for(viewer, condition):
 
 
 def test_a_browser_is_told_the_scene_and_its_controls_do_what_they_say(server, viewer):
-    session, target = viewer.session, viewer.scene.target
+    session, target = viewer.session, viewer.drawing.target
     with connect(f"ws://{HOST}:{server.get_port()}", max_size=None, max_queue=None) as connection:
         browser, told = Browser(connection), b""
         wait_for(viewer, server.get_clients)
@@ -85,7 +85,7 @@ def test_a_browser_is_told_the_scene_and_its_controls_do_what_they_say(server, v
         assert not session.playing
         browser.set(viewer.joints[3], -1.0)
         wait_for(viewer, lambda: session.mode is Mode.HAND)
-        assert session.shown()[0].q[3] == -1.0
+        assert session.shown()[0].scene.q[3] == -1.0
         session.scrub(0.0)
         viewer.tick(0.0)
         browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
@@ -98,8 +98,8 @@ def test_what_is_played_is_shown(viewer):
     viewer.session.toggle()
     viewer.tick(0.01)
     session = viewer.session
-    np.testing.assert_allclose(viewer.scene.target.position, session.stage.frames[10, 9:], atol=1e-12)
-    frame = viewer.scene._arms[1]._frames[2]
+    np.testing.assert_allclose(viewer.drawing.target.position, session.stage.frames[10, 9:], atol=1e-12)
+    frame = viewer.drawing._arms[1]._frames[2]
     q = session.replays[1].q[10]
     turned = [np.cos(q[2] / 2), *(np.sin(q[2] / 2) * session.stage.scenario.arm.axes[2])]
     np.testing.assert_allclose(frame.wxyz, turned, atol=1e-6)  # viser leaves out what is nearly the same
@@ -110,12 +110,12 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     viewer.tick(1.0)  # readings and sliders are due
     viewer.tick(0.0)
     assert viewer.session.mode is Mode.PLAY
-    assert viewer.joints[0].value == pytest.approx(viewer.session.shown()[0].q[0], abs=1e-4)
+    assert viewer.joints[0].value == pytest.approx(viewer.session.shown()[0].scene.q[0], abs=1e-4)
     assert "dls" in viewer.readings.content
 
 
 def test_a_picture_leaves_the_target_in_the_hand_that_drags_it(viewer):
-    session, target = viewer.session, viewer.scene.target
+    session, target = viewer.session, viewer.drawing.target
     start = target.position.copy()
     np.testing.assert_allclose(start, session.stage.frames[0, 9:], atol=1e-12)
     target.position = start + 0.01

@@ -99,12 +99,12 @@ def test_a_placed_arm_has_forgotten(stage):
 def test_play_speed_pause_end_and_scrub(session):
     assert (session.mode, session.playing, session.step) == (Mode.PLAY, False, 0)
     for one in session.shown():
-        np.testing.assert_array_equal(one.q, session.stage.start)
+        np.testing.assert_array_equal(one.scene.q, session.stage.start)
     session.toggle()
     session.advance(0.01)
     assert session.step == 10
     for one, replay in zip(session.shown(), session.replays, strict=True):
-        np.testing.assert_array_equal(one.q, replay.q[10])
+        np.testing.assert_array_equal(one.scene.q, replay.q[10])
         assert (one.position_error, one.cost) == (replay.position_error[10], replay.cost[10])
     np.testing.assert_array_equal(session.reference, session.stage.frames[10])
     session.speed = 2.0
@@ -127,7 +127,7 @@ def test_joints_by_hand_stay_within_the_limits(session):
     arm = session.stage.scenario.arm
     session.place(np.full(7, 10.0))
     for one in session.shown():
-        np.testing.assert_array_equal(one.q, arm.upper)
+        np.testing.assert_array_equal(one.scene.q, arm.upper)
         np.testing.assert_allclose(one.reading.margins, 0.0, atol=1e-12)
         assert one.position_error == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(session.reference[9:], arm.forward(arm.upper)[1], atol=1e-12)
@@ -135,24 +135,24 @@ def test_joints_by_hand_stay_within_the_limits(session):
 
 def test_arms_follow_a_target_from_where_they_are(session):
     session.scrub(0.02)
-    before = [one.q for one in session.shown()]
+    before = [one.scene.q for one in session.shown()]
     target = moved(session.reference, [0.0, 0.0, 0.005], 0.02)
     session.aim(target)
     assert session.mode is Mode.FOLLOW
     for one, q in zip(session.shown(), before, strict=True):
-        np.testing.assert_array_equal(one.q, q)
+        np.testing.assert_array_equal(one.scene.q, q)
     session.advance(2.0)
     for one in session.shown():
         assert one.position_error < 1e-4
         assert one.orientation_error < 1e-3
-        np.testing.assert_allclose(session.stage.scenario.arm.forward(one.q)[1], target[9:], atol=1e-4)
+        np.testing.assert_allclose(session.stage.scenario.arm.forward(one.scene.q)[1], target[9:], atol=1e-4)
     assert session.kept == pytest.approx(1.0)
     session.aim(moved(target, [3.0, 0.0, 0.0]))  # out of reach
     arm = session.stage.scenario.arm
     for _ in range(10):
         session.advance(0.1)
         for one in session.shown():
-            assert ((arm.lower <= one.q) & (one.q <= arm.upper)).all()
+            assert ((arm.lower <= one.scene.q) & (one.scene.q <= arm.upper)).all()
 
 
 def test_part_of_a_step_is_not_lost(session):
@@ -195,6 +195,6 @@ def test_privileged_information_plays_only():
     session.advance(0.003)
     reference, solver = session.shown()
     assert reference.status == PLAYS_ONLY
-    np.testing.assert_array_equal(reference.q, session.stage.start)
-    assert np.abs(solver.q - session.stage.start).max() > 0.0
+    np.testing.assert_array_equal(reference.scene.q, session.stage.start)
+    assert np.abs(solver.scene.q - session.stage.start).max() > 0.0
     assert "from its limit" not in session.text(session.shown())  # an arm without limits

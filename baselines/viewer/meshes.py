@@ -1,4 +1,4 @@
-"""An arm in viser's scene: a frame for each joint, which carries cylinders or the meshes of a URDF file."""
+"""The meshes of a URDF file, read within bounds, on the frames of an arm."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 import trimesh
 import yourdfpy
 
-from baselines.viewer.readings import FREE, Colour, Reading
-from baselines.viewer.replay import size
 from ikgym.arms import Arm
 from ikgym.arms.urdf import MAX_BYTES
 from ikgym.arms.urdf.xml import parse
@@ -20,8 +18,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_file
 from ikgym.validation import FloatArray
 
-# Radii and half a length, as shares of the arm's reach.
-LINK, JOINT, JOINT_HALF, TOOL, RAIL = 0.016, 0.026, 0.034, 0.026, 0.009
 # Largest difference in [m], or in entries of a rotation, between the tools of an arm and of its URDF file. Files that
 # have 1.57 for half of π are off by more than a millimetre.
 TOLERANCE = 5e-3
@@ -36,68 +32,6 @@ class Shape(NamedTuple):
 
     frame: int  # number of the frame: 0 for the base, then one for each joint
     mesh: Any  # a `trimesh.Trimesh`, in that frame
-
-
-class DrawnArm:
-    """An arm in the scene: joints in the colour of their limits, a ball at the tool in that of the manipulability."""
-
-    def __init__(self, server: Any, root: str, arm: Arm, colour: Colour, shapes: list[Shape] | None = None) -> None:
-        self._scene, self._arm = server.scene, arm
-        #: Names of the frames, that of the base first.
-        self.names = [root]
-        for joint in range(arm.joints):
-            self.names.append(f"{self.names[-1]}/joint_{joint}")
-        self._frames = [self._scene.add_frame(name, show_axes=False) for name in self.names[1:]]
-        self._joints = self._cylinders(colour) if shapes is None else []
-        for number, shape in enumerate(shapes or ()):
-            name = f"{self.names[shape.frame]}/mesh_{number}"
-            self._scene.add_mesh_simple(name, shape.mesh.vertices, shape.mesh.faces, color=colour)
-        ball = f"{self.names[-1]}/tool"
-        self._tool = self._scene.add_icosphere(ball, radius=TOOL * size(arm), color=FREE, position=arm.tool)
-
-    def show(self, q: FloatArray, reading: Reading) -> None:
-        """Moves it to joint coordinates in [rad] or [m], of shape (n,), in the colours of a reading."""
-        for frame, position, wxyz in zip(self._frames, *joint_frames(self._arm, q), strict=True):
-            frame.position, frame.wxyz = position, wxyz
-        for handle, colour in zip(self._joints, reading.joints, strict=False):  # meshes have the colour of their policy
-            handle.color = colour
-        self._tool.color = reading.tool
-
-    def _cylinders(self, colour: Colour) -> list[Any]:
-        """Adds links, joints and rails; returns the joints."""
-        arm, whole, joints = self._arm, size(self._arm), []
-        for frame, end in enumerate([*arm.offsets, arm.tool]):
-            if np.linalg.norm(end) > 1e-6 * whole:
-                self._cylinder(frame, "link", (np.zeros(3), end), LINK * whole, colour)
-        for joint, (offset, axis) in enumerate(zip(arm.offsets, arm.axes, strict=True)):
-            half = JOINT_HALF * whole * axis
-            joints.append(self._cylinder(joint + 1, "joint", (-half, half), JOINT * whole, FREE))
-            if arm.prismatic[joint]:
-                first, last = np.clip((arm.lower[joint], arm.upper[joint]), -0.5 * whole, 0.5 * whole)
-                self._cylinder(joint, "rail", (offset + first * axis, offset + last * axis), RAIL * whole, FREE)
-        return joints
-
-    def _cylinder(
-        self, frame: int, name: str, ends: tuple[FloatArray, FloatArray], radius: float, colour: Colour
-    ) -> Any:
-        mesh = trimesh.creation.cylinder(radius, segment=ends, sections=24)
-        return self._scene.add_mesh_simple(f"{self.names[frame]}/{name}", mesh.vertices, mesh.faces, color=colour)
-
-
-def joint_frames(arm: Arm, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The frame of each joint, seen from that of the joint before: ``H_i`` of :class:`ikgym.arms.Arm`.
-
-    Args:
-        arm: The arm.
-        q: Joint coordinates in [rad] or [m]. Shape (n,).
-
-    Returns:
-        Positions in [m], of shape (n, 3), and unit quaternions (w, x, y, z), of shape (n, 4).
-    """
-    prismatic = np.array(arm.prismatic)
-    travel, half = np.where(prismatic, q, 0.0), np.where(prismatic, 0.0, 0.5 * q)
-    positions = arm.offsets + travel[:, None] * arm.axes
-    return positions, np.hstack([np.cos(half)[:, None], np.sin(half)[:, None] * arm.axes])
 
 
 class _Model(yourdfpy.URDF):  # type: ignore[misc]  # yourdfpy has no types
