@@ -1,4 +1,4 @@
-"""Kernels shared by all policies, from the observation to the cut at the velocity limit."""
+"""Input and output of the kernels of all solvers, and what they share, from the checks to the velocity limit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Ints = npt.NDArray[np.int64]
 
 _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 
-#: Result of a step's kernel for observations that are not finite; otherwise that of :func:`cut_rows`.
+#: Result of a call for observations that are not finite; otherwise that of :func:`cut_rows`.
 REFUSED = 2
 
 # The row of :attr:`Model.limits` behind those of an arm.
@@ -46,6 +46,10 @@ def all_finite(q, qdot, pose, nominal, remaining):
     return largest != _EXPONENT
 
 
+#: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
+Memory = tuple[npt.NDArray[Any], ...]
+
+
 class Model(NamedTuple):
     """The model of the arm, the task, the cost and the limits, as the kernels of all solvers see them.
 
@@ -68,15 +72,22 @@ class Model(NamedTuple):
     limits: Floats
 
 
-class Seen(NamedTuple):
-    """Observations of B arms as the kernels of solvers see them.
+class Batch(NamedTuple):
+    """Observations of B arms, as float64.
 
     Attributes:
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        qdot: Joint velocities last applied, in [rad/s] or [m/s]. Shape (B, n).
+        qdot: Joint velocities last applied, in [rad/s] or [m/s]; where a policy remembers it, its last command, see
+            :attr:`SolverPolicy.remembers_command`. Shape (B, n).
         pose: Measured task coordinates. Shape (B, m).
-        nominal: Reference task coordinates ahead. Shape (B, p, m).
-        remaining: Steps left. Shape (B,).
+        nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
+        remaining: Steps left. Shape (B, 1).
+        q_age: How many steps ago q was measured; None where the observation does not say. Shape (B, 1).
+        pose_age: How many steps ago the pose was measured; likewise. Shape (B, 1).
+        commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
+            observed. Shape (B, h, n).
+        obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`;
+            None where they are always the same. Shape (B, o, 16).
     """
 
     q: Floats
@@ -84,18 +95,24 @@ class Seen(NamedTuple):
     pose: Floats
     nominal: Floats
     remaining: Floats
+    q_age: Floats | None = None
+    pose_age: Floats | None = None
+    commands: Floats | None = None
+    obstacles: Floats | None = None
 
 
-class Answer(NamedTuple):
-    """Receives the result of a step.
+class Solution(NamedTuple):
+    """The result of a solver, which a kernel writes in place.
 
     Attributes:
         qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
+        memory: Memory for the next step, each array with a leading axis of B.
         status: Values of :class:`Status`. Shape (B,).
         iterations: Iterations made. Shape (B,).
     """
 
     qdot: Floats
+    memory: Memory
     status: Ints
     iterations: Ints
 
@@ -129,68 +146,67 @@ def model_of(block):
     return Model(chain, int(block[1]), cost, block[2], block[8:limits], block[limits:offsets].reshape(5, n))
 
 
-def parts_of(answer: Any, rows: int, n: int) -> tuple[Any, Any, Any]:
-    """Views of the block of an answer: joint velocities (B, n), status and iterations (B,)."""
-    return answer[2 * rows :].view(np.float64).reshape(rows, n), answer[:rows], answer[rows : 2 * rows]
-
-
-_parts_of = kernel(parts_of)
-
-
-def entry(step: Any, numbers: type, memory: type, remembers: bool) -> Any:
+def compile_step(step: Any, numbers: type, memory: type, remembers: bool, cuts: bool) -> Any:
     """The compiled call behind `predict` of a solver, around the kernel of its step.
 
-    It takes the named tuples of the kernel apart, which numba reads three times as fast as plain tuples, checks the
+    It puts the named tuples of the kernel together from plain tuples, which numba reads three times as fast, checks the
     observations, and cuts the joint velocities to the velocity limit.
 
     Args:
-        step: The kernel, ``step(model, numbers, seen, memory, answer)``, see :class:`CompiledPolicy`.
+        step: The kernel, ``step(model, numbers, batch, solution)``, see :class:`CompiledPolicy`.
         numbers: The named tuple of its parameters.
         memory: The named tuple of its memory.
-        remembers: Whether the last commands stand behind the memory, and are the ``qdot`` that the kernel sees.
+        remembers: Whether the memory ends with the last commands, and they are the ``qdot`` that the kernel sees.
+        cuts: Whether joint velocities are turned into actions.
 
     Returns:
-        ``call(block, numbers, checking, seen, memory, action, answer)`` with plain tuples and flat arrays, whatever the
-        number of rows, but for the reference coordinates of shape (B p, m). The memory becomes the next one in place.
-        It returns REFUSED for observations that are not finite, else the status of :func:`cut_rows`; with an ``action``
-        of no elements nothing is cut.
+        ``call(block, numbers, checking, observation, memory, out, counts)`` with plain tuples and flat arrays for any
+        number of rows; the reference coordinates have the shape (B p, m), and ``counts``, which receives status and
+        iterations, the shape (2, B). The memory becomes the next one in place, and ``out`` receives actions, or joint
+        velocities. The call returns REFUSED for observations that are not finite, else the result of :func:`cut_rows`.
     """
     python = getattr(step, "py_func", step)
-    scope = {**globals(), "step": step, "Numbers": numbers, "Memory": memory, "remembers": remembers}
+    scope = {**globals(), "step": step, "NumbersTuple": numbers, "MemoryTuple": memory}
+    scope |= {"remembers": remembers, "cuts": cuts}
     call = types.FunctionType(_call.__code__, scope, f"{python.__name__}_call")
     name = f"{python.__name__}_{zlib.crc32(numbers.__name__.encode()):08x}_{memory.__name__}"
-    call.__module__, call.__qualname__ = python.__module__, f"{name}_remembering" if remembers else name
+    call.__module__, call.__qualname__ = python.__module__, name + "_remembers" * remembers + "_cuts" * cuts
     return kernel(call)
 
 
-def _call(block: Any, numbers: Any, checking: Any, seen: Any, memory: Any, action: Any, answer: Any) -> Any:
-    """See :func:`entry`, which gives each solver a copy with its own ``step``, ``Numbers`` and ``Memory``."""
-    q, qdot, pose, nominal, remaining = seen
-    if checking and not all_finite(q, qdot, pose, nominal, remaining):
+def _call(block: Any, numbers: Any, checking: Any, observation: Any, memory: Any, out: Any, counts: Any) -> Any:
+    """See :func:`compile_step`: each solver has a copy with its ``step``, ``NumbersTuple`` and ``MemoryTuple``."""
+    q, last, pose, nominal, remaining = observation
+    if checking and not all_finite(q, last, pose, nominal, remaining):
         return REFUSED
     model, n, m = model_of(block), int(block[0]), nominal.shape[1]
     rows = q.shape[0] // n
     if remembers:  # type: ignore[name-defined]  # noqa: F821
-        last = memory[-1].reshape(-1)
-        for i in range(last.shape[0]):
-            if math.isnan(last[i]):
-                last[i] = qdot[i]
-        qdot, memory = last, memory[:-1]
+        command, memory = memory[-1].reshape(-1), memory[:-1]
+        for i in range(command.shape[0]):
+            if math.isnan(command[i]):
+                command[i] = last[i]
+        last = command
+    qdot = np.empty(rows * n) if cuts else out  # type: ignore[name-defined]  # noqa: F821
     ahead = nominal.reshape(rows, nominal.shape[0] // max(rows, 1), m)
-    shown = Seen(q.reshape(rows, n), qdot.reshape(rows, n), pose.reshape(rows, m), ahead, remaining)
-    out = Answer(*_parts_of(answer, rows, n))
-    step(model, Numbers(*numbers), shown, Memory(*memory), out)  # type: ignore[name-defined]  # noqa: F821
-    if action.shape[0] == 0:
+    extras = None, None, None, None
+    batch = Batch(
+        q.reshape(rows, n), last.reshape(rows, n), pose.reshape(rows, m), ahead, remaining.reshape(rows, 1), *extras
+    )
+    solution = Solution(qdot.reshape(rows, n), MemoryTuple(*memory), counts[0], counts[1])  # type: ignore[name-defined]  # noqa: F821
+    step(model, NumbersTuple(*numbers), batch, solution)  # type: ignore[name-defined]  # noqa: F821
+    if not cuts:  # type: ignore[name-defined]  # noqa: F821
         return False
-    result = cut_rows(out.qdot, model.velocity_limit, action.reshape(rows, n), out.status)
+    action = out.reshape(rows, n)
+    result = cut_rows(solution.qdot, model.velocity_limit, action, solution.status)
     if remembers:  # type: ignore[name-defined]  # noqa: F821
-        sent_rows(model, shown.q, action.reshape(rows, n), shown.qdot)
+        sent_rows(model, batch.q, action, batch.qdot)
     return result
 
 
 @kernel
 def sent_rows(model, q, action, last):
-    """The joint velocities that an ideal arm within the limits makes of actions, row by row.
+    """Calculates the joint velocities of an ideal arm within its limits from actions, row by row.
 
     Args:
         model: The :class:`Model`.
@@ -206,12 +222,12 @@ def sent_rows(model, q, action, last):
 
 @kernel
 def cut_rows(qdot, limit, action, status):
-    """Joint velocities as fractions of their limit, within the box, row by row.
+    """Turns joint velocities into fractions of their limit, within the box, row by row.
 
     Args:
         qdot: In [rad/s] or [m/s]. Shape (B, n).
         limit: In [rad/s] or [m/s]. Shape (n,).
-        action: Receives the actions; zeros where a number is not finite. Shape (B, n).
+        action: Receives the actions; NaN in rows with a number that is not finite. Shape (B, n).
         status: Raised to the status of the row. Shape (B,).
 
     Returns:
@@ -232,7 +248,7 @@ def cut_rows(qdot, limit, action, status):
             any_lost = True
             status[row] = _DIVERGED
             for j in range(qdot.shape[1]):
-                action[row, j] = 0.0
+                action[row, j] = math.nan
         elif saturated:
             status[row] = max(status[row], _SATURATED)
     return any_lost

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.policy.problem import Batch, Memory, Problem
+from baselines.policy.problem import Problem
+from baselines.policy_kernels import Batch, Memory
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED, OBSTACLE, SOMETIMES
 from ikgym.scenarios import Preview

@@ -12,22 +12,21 @@ import numpy.typing as npt
 
 from baselines.policy.arguments import Parts, not_finite
 from baselines.policy.fields import kernel_fields, named_tuple
-from baselines.policy.problem import Batch, Memory, Solution
 from baselines.policy.solver import SolverPolicy, compiled_classes
 from baselines.policy.surroundings import surroundings_of
-from baselines.policy_kernels import REFUSED, NoMemory, entry, parts_of
+from baselines.policy_kernels import REFUSED, Batch, Memory, NoMemory, Solution, compile_step
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.validation import FloatArray
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
-    """Base of solvers that are one kernel, ``step(model, numbers, seen, memory, answer)``.
+    """Base of solvers that are one kernel, ``step(model, numbers, batch, solution)``.
 
     The kernel is given the :class:`Model`, the policy's fields as a named tuple, see :meth:`numbers`, the observations
-    as :class:`Seen`, and the memory as the named tuple of :meth:`memory`; it turns the memory into the next one in
-    place and fills in the :class:`Answer`. Checks, batches, threads and the cut to the velocity limit are dealt with
-    here.
+    as a :class:`Batch` without extras, and the :class:`Solution`, whose memory is the named tuple of :meth:`memory`. It
+    fills in joint velocities, status and iterations, and turns the memory into the next one in place. Checks, batches,
+    threads and the cut to the velocity limit are dealt with here.
     """
 
     sees_extras: ClassVar[bool] = False
@@ -69,15 +68,14 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         rows, n = batch.q.shape
-        call, block, numbers, _ = self._kernel
-        answer, kept = np.empty(rows * (n + 2), np.int64), tuple([array.copy() for array in memory])
-        parts: Parts = self._flat(batch)
+        _, call, block, numbers, _ = self._kernel
+        qdot, counts = np.empty(rows * n), np.empty((2, rows), np.int64)
+        kept, parts = tuple([array.copy() for array in memory]), self._flat(batch)
         last = (batch.qdot,) if self.remembers_command else ()  # :meth:`SolverPolicy.act` has put it there
         if self.sees_extras:
-            parts, numbers = self._told(parts, numbers)
-        call(block, numbers, False, parts, (*kept, *last), np.empty(0, np.float32), answer)  # nothing is cut here
-        qdot, status, iterations = parts_of(answer, rows, n)
-        return Solution(qdot, self._named(kept), status, iterations)
+            parts, numbers = self._with_obstacles(parts, numbers)
+        call(block, numbers, False, parts, (*kept, *last), qdot, counts)
+        return Solution(qdot.reshape(rows, n), self._named(kept), *counts)
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """See :meth:`SolverPolicy.act`; in one call of the kernel, unless threads share out the rows."""
@@ -86,38 +84,38 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         action, after = self._step(self._flat(batch), len(batch.q), memory, False)
         return action.reshape(batch.q.shape), after
 
-    def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
-        """See :meth:`SolverPolicy._answer`; in one call of the kernel, unless threads share out the rows."""
+    def _respond(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
+        """See :meth:`SolverPolicy._respond`; in one call of the kernel, unless threads share out the rows."""
         if single:
             return self._step(parts, 1, memory, True)
         rows = len(parts[0])
         if not self._undivided(rows):
-            return super()._answer(parts, single, memory)
+            return super()._respond(parts, single, memory)
         action, after = self._step(self._flat(parts), rows, memory, True)
         return action.reshape(parts[0].shape), after
 
     def _step(self, parts: Parts, rows: int, memory: Memory, checking: bool) -> tuple[Any, Memory]:
         """Actions, flat, and the state for the next call."""
-        call, block, numbers, n = self._kernel
-        action, answer = np.empty(rows * n, np.float32), np.empty(rows * (n + 2), np.int64)
+        call, _, block, numbers, n = self._kernel
+        action, counts = np.empty(rows * n, np.float32), np.empty((2, rows), np.int64)
         kept: Memory = tuple([array.copy() for array in memory])
         if self.sees_extras:
-            parts, numbers = self._told(parts, numbers)
-        code = call(block, numbers, checking, parts, kept, action, answer)
+            parts, numbers = self._with_obstacles(parts, numbers)
+        code = call(block, numbers, checking, parts, kept, action, counts)
         if code:
             if code == REFUSED:
                 raise not_finite()
-            kept = self._without_lost(kept, parts_of(answer, rows, n)[0])
-        return action, (answer[:rows], answer[rows : 2 * rows], *kept)
+            kept = self._without_lost(kept, action.reshape(rows, n))
+        return action, (counts[0], counts[1], *kept)
 
     def _flat(self, parts: Parts) -> Parts:
-        """The arrays of a batch as :func:`entry` takes them, and the obstacles as they are, where they are shown."""
+        """The arrays of a batch as :func:`compile_step` takes them, and the obstacles where they are shown."""
         q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
         ahead = nominal.reshape(-1, nominal.shape[2])
         flat = q.reshape(-1), qdot.reshape(-1), pose.reshape(-1), ahead, remaining.reshape(-1)
         return (*flat, parts[-1]) if self.sees_extras else flat
 
-    def _told(self, parts: Parts, numbers: tuple[Any, ...]) -> tuple[Parts, tuple[Any, ...]]:
+    def _with_obstacles(self, parts: Parts, numbers: tuple[Any, ...]) -> tuple[Parts, tuple[Any, ...]]:
         """The five arrays of an observation, and the numbers with the obstacles that it shows."""
         shown, expected = parts[-1], numbers[-1].shape[1:]
         if shown is None or shown.shape[-2:] != expected:
@@ -126,21 +124,21 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         return parts[: len(OBSERVED)], (*numbers[:-1], shown.reshape(-1, *expected))
 
     @functools.cached_property
-    def _kernel(self) -> tuple[Any, FloatArray, tuple[Any, ...], int]:
-        """The compiled call, its arguments that never change, and the number of joints."""
-        n, m, among = self.problem.model.joints, self.problem.task.size, self.among_bodies
-        numbers: tuple[Any, ...] = self.numbers()
-        step = type(self).step_among if among else type(self).step
-        call = _entry(step, type(numbers), type(self._example), self.remembers_command)
-        block, kept = self.problem.kernel_block, tuple(numbers)
+    def _kernel(self) -> tuple[Any, Any, FloatArray, tuple[Any, ...], int]:
+        """The compiled calls for actions and for joint velocities, their constant arguments, and how many joints."""
+        n, m, numbers = self.problem.model.joints, self.problem.task.size, self.numbers()
+        step = type(self).step_among if self.among_bodies else type(self).step
+        tuples: Any = type(numbers), type(self._example)
+        call, other = (_compile(step, *tuples, self.remembers_command, cuts) for cuts in (True, False))
+        block, numbers = self.problem.kernel_block, tuple(numbers)
         if call not in compiled_classes:
             with self._first_call():
                 compiled_classes.add(call)
                 nothing = (*np.empty((3, 0)), np.empty((0, m)), np.empty(0))
-                memory, out = tuple(self.initial_memory(0)), (np.empty(0, np.float32), np.empty(0, np.int64))
-                call(block, kept, False, nothing, memory, *out)
-        return call, block, kept, n
+                out = np.empty(0, np.float32), np.empty((2, 0), np.int64)
+                call(block, numbers, False, nothing, tuple(self.initial_memory(0)), *out)
+        return call, other, block, numbers, n
 
 
 #: One compiled call for each kernel and the types of its arguments.
-_entry = functools.cache(entry)
+_compile = functools.cache(compile_step)

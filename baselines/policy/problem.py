@@ -1,13 +1,12 @@
-"""Input and output of a policy: problem, observations, solution."""
+"""The problem of a policy."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any, NamedTuple, Self
+from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy_kernels import Model, model_block, model_of
 from ikgym.arms import Arm
@@ -21,8 +20,6 @@ from ikgym.validation import FloatArray, frozen_array, read_only
 
 # Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
 ROUNDING = 2.0**-24
-#: Arrays with a leading axis of B: the memory of a policy, or a whole state, see :mod:`baselines.policy.arguments`.
-Memory = tuple[npt.NDArray[Any], ...]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -92,48 +89,3 @@ class Problem(Frozen):
             return cls(*usual)
         model = scenario.model.replace(bodies=scenario.arm.bodies)
         return cls(model, *usual[1:], scenario.surroundings, scenario.obstacles_shown)
-
-
-class Batch(NamedTuple):
-    """Observations of B arms, as float64.
-
-    Attributes:
-        q: Joint coordinates in [rad] or [m]. Shape (B, n).
-        qdot: Joint velocities last applied, in [rad/s] or [m/s]; where a policy remembers it, its last command, see
-            :attr:`SolverPolicy.remembers_command`. Shape (B, n).
-        pose: Measured task coordinates. Shape (B, m).
-        nominal: Nominal task coordinates ahead, X^N(k+1) first. Shape (B, p, m).
-        remaining: Steps left. Shape (B, 1).
-        q_age: How many steps ago q was measured; None where the observation does not say. Shape (B, 1).
-        pose_age: The same of the pose. Shape (B, 1).
-        commands: The last commands as joint velocities, newest first, in [rad/s] or [m/s]; None where they are not
-            observed. Shape (B, h, n).
-        obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`;
-            None where they are always the same. Shape (B, o, 16).
-    """
-
-    q: FloatArray
-    qdot: FloatArray
-    pose: FloatArray
-    nominal: FloatArray
-    remaining: FloatArray
-    q_age: FloatArray | None = None
-    pose_age: FloatArray | None = None
-    commands: FloatArray | None = None
-    obstacles: FloatArray | None = None
-
-
-class Solution(NamedTuple):
-    """The result of a solver.
-
-    Attributes:
-        qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-        memory: Memory for the next step, each array with a leading axis of B.
-        status: Values of :class:`Status`. Shape (B,).
-        iterations: Iterations made. Shape (B,).
-    """
-
-    qdot: FloatArray
-    memory: Memory
-    status: npt.NDArray[np.int64]
-    iterations: npt.NDArray[np.int64]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from baselines.policy.problem import Solution
+from baselines.policy_kernels import Solution
 from ikgym.kernels.threads import in_chunks
 
 #: Which threads work on a share of a batch. Calls within them are not shared out further: threads of one pool that

@@ -28,9 +28,9 @@ from baselines.policy.arguments import (
     taken,
     truth_values,
 )
-from baselines.policy.problem import Batch, Memory, Problem, Solution
+from baselines.policy.problem import Problem
 from baselines.policy.sharing import divided, undivided
-from baselines.policy_kernels import all_finite, cut_rows, sent_rows
+from baselines.policy_kernels import Batch, Memory, Solution, all_finite, cut_rows, sent_rows
 from ikgym.frozen import Frozen
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
@@ -185,7 +185,7 @@ class SolverPolicy(Frozen, abc.ABC):
         parts, rows, single = self._read(observation)
         if self.sees_extras:
             parts = *parts, *self._read.extras(observation, rows, single)
-        action, after = self._answer(parts, single, self._recall(state, episode_start, rows))
+        action, after = self._respond(parts, single, self._recall(state, episode_start, rows))
         self._last[0] = after
         return action, after
 
@@ -211,7 +211,7 @@ class SolverPolicy(Frozen, abc.ABC):
             sent_rows(problem.kernel_model, batch.q, action, last)
             kept = (*kept, last)
         if lost:
-            kept = self._without_lost(kept, qdot)
+            kept = self._without_lost(kept, action)
         return action, pack(status, iterations, kept)
 
     @staticmethod
@@ -237,7 +237,7 @@ class SolverPolicy(Frozen, abc.ABC):
     def _read(self) -> ObservationReader:
         return ObservationReader(self.name, self.problem, self.preview)
 
-    def _answer(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
+    def _respond(self, parts: Parts, single: bool, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """The result of `predict`, for observations and memory of the right shapes."""
         batch = as_batch(parts, single)
         if not all_finite(*batch[: len(OBSERVED)]):
@@ -245,9 +245,10 @@ class SolverPolicy(Frozen, abc.ABC):
         action, after = self.act(batch, memory)
         return action[0] if single else action, after
 
-    def _without_lost(self, memory: Memory, qdot: FloatArray) -> Memory:
-        """A memory, cleared where a joint velocity is no number; with the values of the start of an episode."""
-        lost = np.asarray(~np.isfinite(qdot / self.problem.velocity_limit).all(axis=1))
+    def _without_lost(self, memory: Memory, action: npt.NDArray[np.float32]) -> Memory:
+        """A memory, cleared in rows whose action is NaN, as at the start of an episode; their actions become 0."""
+        lost = np.asarray(np.isnan(action).any(axis=1))
+        action[lost] = 0.0
         return replace_rows(memory, self.initial_memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:

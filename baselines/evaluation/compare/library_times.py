@@ -36,7 +36,7 @@ def library_times(policy: Rival, scenario: Scenario, steps: int) -> FloatArray:
     start, spent = observation["q"].copy(), np.empty(min(steps, scenario.steps))
     for k in range(len(spent)):
         q, qdot, pose, nominal = (observation[key] for key in ("q", "qdot", "pose", "nominal"))
-        seen = policy.seen(q, qdot, start, pose, nominal[0])
+        seen = policy.target(q, qdot, start, pose, nominal[0])
         begin = time.perf_counter()
         found = call(seen)
         spent[k] = time.perf_counter() - begin

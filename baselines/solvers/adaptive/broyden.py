@@ -35,31 +35,32 @@ class BroydenMemory(NamedTuple):
 
 
 @kernel
-def broyden_step(model, numbers, seen, memory, answer):
+def broyden_step(model, numbers, batch, solution):
     """One step of :class:`Broyden`; see :class:`CompiledPolicy` for the arguments.
 
     Iterations are 0 where nothing has been measured before, and 1 later.
     """
-    answer.iterations[:] = memory.known
+    memory = solution.memory
+    solution.iterations[:] = memory.known
     nominal = NominalMemory(memory.nominal, memory.known)
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, nominal)
-    learn_rows(model.kind, numbers.motion, seen, answer.iterations, memory, jacobian)
+    jacobian, shift, error = task_motion(model, batch, nominal)
+    learn_rows(model.kind, numbers.motion, batch, solution.iterations, memory, jacobian)
     add_feedback(numbers.gain, error, shift)
-    damped_rows(jacobian, shift, numbers.damping, answer.qdot)
-    answer.status[:] = APPLIED
+    damped_rows(jacobian, shift, numbers.damping, solution.qdot)
+    solution.status[:] = APPLIED
     for row in range(shift.shape[0]):
-        for j in range(answer.qdot.shape[1]):
-            answer.qdot[row, j] /= model.dt
+        for j in range(solution.qdot.shape[1]):
+            solution.qdot[row, j] /= model.dt
 
 
 @inner
-def learn_rows(kind, motion, seen, had, memory, jacobian):
+def learn_rows(kind, motion, batch, had, memory, jacobian):
     """Makes estimates of Jacobians, row by row, and remembers the step.
 
     Args:
         kind: The kind of task coordinates.
         motion: ε.
-        seen: The observations, a :class:`Seen`.
+        batch: The observations, a :class:`Batch`.
         had: Whether there was a step before. Shape (B,).
         memory: The :class:`BroydenMemory`, changed in place.
         jacobian: Those of the model; become their estimates B. Shape (B, e, n).
@@ -70,9 +71,9 @@ def learn_rows(kind, motion, seen, had, memory, jacobian):
         estimate, learnt = jacobian[row], memory.learnt[row]
         square = motion * motion
         for k in range(n):
-            moved[k] = seen.q[row, k] - memory.q[row, k]
+            moved[k] = batch.q[row, k] - memory.q[row, k]
             square += moved[k] * moved[k]
-        task_kernels.error(kind, seen.pose[row], memory.pose[row], missing)  # Δy
+        task_kernels.error(kind, batch.pose[row], memory.pose[row], missing)  # Δy
         for a in range(e):
             if had[row]:
                 for k in range(n):
@@ -81,7 +82,7 @@ def learn_rows(kind, motion, seen, had, memory, jacobian):
                     learnt[a, k] += missing[a] * moved[k] / square
             for k in range(n):
                 estimate[a, k] += learnt[a, k]
-        memory.q[row], memory.pose[row] = seen.q[row], seen.pose[row]
+        memory.q[row], memory.pose[row] = batch.q[row], batch.pose[row]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -55,18 +55,18 @@ class RotationMemory(NamedTuple):
 
 
 @kernel
-def rotation_step(model, numbers, seen, memory, answer):
+def rotation_step(model, numbers, batch, solution):
     """One inner iteration, row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt = model.chain, model.kind, model.dt
     counter_rotation, deformation = numbers.codes
     rule = numbers.r_a, numbers.share, EPSA, Q_PP_MAX
-    q, pose, nominal, (direction, angles, point, held) = seen.q, seen.pose, seen.nominal, memory
-    goals, status, iterations = answer
+    q, pose, nominal, (direction, angles, point, held) = batch.q, batch.pose, batch.nominal, solution.memory
+    goals, _, status, iterations = solution
     n, m, turned = q.shape[1], pose.shape[1], direction.shape[1]
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     jacobian, error, extended = np.empty((m, n)), np.empty(m), np.empty((3, n + 1))
     h, actual, desired, e_a, e_b = np.empty(n), np.empty(n), np.empty(n), np.empty(turned), np.empty(turned)
-    missing, seen, wanted = np.empty(m), np.empty(m), np.empty(m)
+    missing, weighted, wanted = np.empty(m), np.empty(m), np.empty(m)
     for row in range(q.shape[0]):
         target, goal = nominal[row, 0], goals[row]
         forward_and_jacobian(chain, _configuration(q[row], target, point, held, row), rotation, position, geometric)
@@ -75,13 +75,13 @@ def rotation_step(model, numbers, seen, memory, answer):
         for i in range(m):
             error[i] = target[i] - pose[row, i]
             missing[i] = numbers.f[i] * error[i]
-            seen[i] = numbers.f[i] * pose[row, i]
+            weighted[i] = numbers.f[i] * pose[row, i]
             wanted[i] = numbers.f[i] * target[i]
         angles[row, 0] = 0.0
         if counter_rotation == _TASK:
-            angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, seen, wanted)
+            angles[row, 0] = _turn_back(missing, direction[row], e_a, e_b, weighted, wanted)
         transposed_product(jacobian, missing, h)
-        transposed_product(jacobian, seen, actual)
+        transposed_product(jacobian, weighted, actual)
         transposed_product(jacobian, wanted, desired)
         if counter_rotation == _JOINTS:
             angles[row, 0] = _turn_back(h, direction[row], e_a, e_b, actual, desired)

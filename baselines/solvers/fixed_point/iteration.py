@@ -32,13 +32,13 @@ class FixedPointMemory(NamedTuple):
 
 
 @kernel
-def fixed_point_step(model, numbers, seen, memory, answer):
+def fixed_point_step(model, numbers, batch, solution):
     """The iterations of one step, row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt = model.chain, model.kind, model.dt
     transformation, corrected_by, weights = numbers.code, numbers.corrected_by, numbers.weights
     iterations, tolerance = numbers.iterations, numbers.tolerance
-    starts, nominal, previous = seen.q, seen.nominal, memory.previous
-    q, status, made = answer
+    starts, nominal, previous = batch.q, batch.nominal, solution.memory.previous
+    q, _, status, made = solution
     n, m = q.shape[1], nominal.shape[2]
     e = task_kernels.error_size(kind, m)
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))

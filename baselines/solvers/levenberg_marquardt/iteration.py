@@ -41,13 +41,13 @@ class DampingMemory(NamedTuple):
 
 
 @kernel
-def iteration_step(model, numbers, seen, memory, answer):
+def iteration_step(model, numbers, batch, solution):
     """The iteration (34)-(41), with one point (11)-(17), row by row; see :class:`CompiledPolicy` for the arguments."""
     chain, kind, dt, rule = model.chain, model.kind, model.dt, DampingLaw(*numbers.law)
     tolerance, most, one_step, horizon = numbers.tolerance, numbers.iterations, numbers.one_step, numbers.points
     predicted, whole_horizon = numbers.predicted, numbers.whole_horizon
-    starts, poses, nominal, (damping, error_before) = seen.q, seen.pose, seen.nominal, memory
-    q, status, iterations = answer
+    starts, poses, nominal, memory = batch.q, batch.pose, batch.nominal, solution.memory
+    (damping, error_before), (q, _, status, iterations) = memory, solution
     n, m = q.shape[1], poses.shape[1]
     size = task_kernels.error_size(kind, m)
     rank = min(size, n, 6)  # redundant coordinates add none

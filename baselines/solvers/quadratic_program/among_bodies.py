@@ -137,41 +137,41 @@ def _moderate(limits, q, velocity):
 
 
 @kernel
-def qp_step_among(model, numbers, seen, memory, answer):
+def qp_step_among(model, numbers, batch, solution):
     """One step of :class:`QuadraticProgram` among bodies; see :class:`CompiledPolicy` for the arguments."""
-    task, (shapes, checked) = task_motion(model.chain, model.kind, seen, memory), bodies_of(numbers.bodies)
-    n, size = seen.q.shape[1], seen.q.shape[1] + numbers.task_scaling
+    task, (shapes, checked) = task_motion(model, batch, solution.memory), bodies_of(numbers.bodies)
+    n, size = batch.q.shape[1], batch.q.shape[1] + numbers.task_scaling
     program = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     near = np.empty(ROWS), np.empty(ROWS), np.empty(ROWS), np.zeros((ROWS, size))
     work = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(size)
     bodies = shapes, checked, near_work(n, shapes.links.shape[0])
-    for row in range(seen.q.shape[0]):
-        _row(row, model, numbers, seen, task, bodies, program, near, work, answer)
+    for row in range(batch.q.shape[0]):
+        _row(row, model, numbers, batch, task, bodies, program, near, work, solution)
 
 
 @uncounted
-def _row(row, model, numbers, seen, task, bodies, program, near, work, answer):
+def _row(row, model, numbers, batch, task, bodies, program, near, work, solution):
     """The step of one arm."""
-    (hessian, linear, lower, upper), (distances, reaches, bounds, rows), q = program, near, seen.q[row]
+    (hessian, linear, lower, upper), (distances, reaches, bounds, rows), q = program, near, batch.q[row]
     (shapes, checked, places), (projection, motion, preferred, away, x) = bodies, work
-    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], answer.qdot[row], numbers.pull
+    jac, shift, error, qdot, pull = task[0][row], task[1][row], task[2][row], solution.qdot[row], numbers.pull
     args = shapes, checked, numbers.boxes[row % numbers.boxes.shape[0]], q, numbers.influence
     count = near_distances(model.chain, *args, places, distances, reaches, rows)
     for j in range(q.shape[0]):
         preferred[j] = pull[0, j] * (pull[1, j] - q[j])
-    weight = row_program(model, numbers, q, seen.qdot[row], jac, shift, error, preferred, program)
+    weight = row_program(model, numbers, q, batch.qdot[row], jac, shift, error, preferred, program)
     task_free(hessian, weight, projection)
     left = keep_clear(model, numbers, q, projection, count, near, motion, away)
     for j in range(q.shape[0]):
         away[j] -= (1.0 - left) * preferred[j]
         preferred[j] += away[j]
         linear[j] += weight * numbers.weights[j] * away[j]
-    answer.iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
+    solution.iterations[row], found = row_minimum(hessian, linear, lower, upper, rows, bounds, count, x)
     for j in range(q.shape[0]):
         qdot[j] = x[j]
-    answer.status[row] = APPLIED if found else LIMIT
+    solution.status[row] = APPLIED if found else LIMIT
     met = False
     for i in range(count):
         met = met or dot(rows[i], x) <= bounds[i] + MET
     if found and held_back(jac, shift, weight, numbers.weights, preferred, qdot, lower, upper, met):
-        answer.status[row] = SATURATED
+        solution.status[row] = SATURATED

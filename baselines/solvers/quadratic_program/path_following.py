@@ -47,18 +47,19 @@ CRAWL, AWAY, SHORT = 1e-3, 0.01, 0.1
 
 
 @kernel
-def path_step(model, numbers, seen, memory, answer):
+def path_step(model, numbers, batch, solution):
     """One step of :class:`PathFollowing`; see :class:`CompiledPolicy` for the arguments."""
-    (q, last), dt, limits, pull = (seen.q, seen.qdot), model.dt, model.limits, numbers.pull
-    n, e = q.shape[1], tasks.error_size(model.kind, seen.pose.shape[1])
+    memory = solution.memory
+    (q, last), dt, limits, pull = (batch.q, batch.qdot), model.dt, model.limits, numbers.pull
+    n, e = q.shape[1], tasks.error_size(model.kind, batch.pose.shape[1])
     hessian, linear, x = np.empty((n + 1, n + 1)), np.empty(n + 1), np.empty(n + 1)
     lower, upper, preferred, jac = np.empty(n + 1), np.empty(n + 1), np.empty(n), np.empty((e, n))
     motion, missing, shift, factor, weights = np.empty(e), np.empty(e), np.empty(e), np.empty((n, n)), numbers.weights
     for row in range(q.shape[0]):
         samples, steps, progress = memory.samples[row], memory.steps[row], memory.progress[row]
-        remember(samples, steps, seen.nominal[row])
+        remember(samples, steps, batch.nominal[row])
         speed = _path_ahead(
-            model, numbers, samples, progress, memory.speed[row], seen.pose[row], q[row], jac, motion, missing
+            model, numbers, samples, progress, memory.speed[row], batch.pose[row], q[row], jac, motion, missing
         )
         velocity_box(limits, dt, q[row], last[row], lower, upper)
         for j in range(n):
@@ -73,15 +74,17 @@ def path_step(model, numbers, seen, memory, answer):
             missing *= feedback_share(factor, jac, missing, numbers.braking, limits[CHANGE])
         least = min(max(steps + 1.0 - numbers.latest - progress, 0.0), 1.0)
         goals = weight, weights, preferred, speed, least
-        made, answer.iterations[row], found = _minimum(jac, motion, missing, goals, (hessian, linear, lower, upper), x)
+        made, solution.iterations[row], found = _minimum(
+            jac, motion, missing, goals, (hessian, linear, lower, upper), x
+        )
         memory.steps[row], memory.progress[row], memory.speed[row] = steps + 1, progress + made, made
         for j in range(n):
-            answer.qdot[row, j] = x[j]
+            solution.qdot[row, j] = x[j]
         for a in range(e):
             shift[a] = missing[a] + made * motion[a]
-        held = held_back(jac, shift, weight, weights, preferred, answer.qdot[row], lower, upper, False)
+        held = held_back(jac, shift, weight, weights, preferred, solution.qdot[row], lower, upper, False)
         stuck = made <= max(least, STUCK) < speed
-        answer.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
+        solution.status[row] = SATURATED if held or stuck else APPLIED if found else LIMIT
 
 
 @inner

@@ -21,10 +21,10 @@ LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 
 
 @kernel
-def qp_step(model, numbers, seen, memory, answer):
+def qp_step(model, numbers, batch, solution):
     """One step of :class:`QuadraticProgram`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, motion, error = task_motion(model.chain, model.kind, seen, memory)
-    q, pull, (qdot, status, iterations) = seen.q, numbers.pull, answer
+    jacobian, motion, error = task_motion(model, batch, solution.memory)
+    q, pull, (qdot, _, status, iterations) = batch.q, numbers.pull, solution
     n, size = q.shape[1], q.shape[1] + numbers.task_scaling
     hessian, linear, lower, upper = np.empty((size, size)), np.empty(size), np.zeros(size), np.zeros(size)
     preferred, x = np.empty(n), np.empty(size)
@@ -33,7 +33,7 @@ def qp_step(model, numbers, seen, memory, answer):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
         jac, shift = jacobian[row], motion[row]
         parts = hessian, linear, lower, upper
-        weight = row_program(model, numbers, q[row], seen.qdot[row], jac, shift, error[row], preferred, parts)
+        weight = row_program(model, numbers, q[row], batch.qdot[row], jac, shift, error[row], preferred, parts)
         iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
         for j in range(n):
             qdot[row, j] = x[j]

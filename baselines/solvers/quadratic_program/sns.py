@@ -89,11 +89,11 @@ def scaling(along, base, lower, upper):
 
 
 @kernel
-def sns_step(model, numbers, seen, memory, answer):
+def sns_step(model, numbers, batch, solution):
     """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     error *= numbers.gain
-    (q, last), (qdot, status, iterations), limits, dt = (seen.q, seen.qdot), answer, model.limits, model.dt
+    (q, last), (qdot, _, status, iterations), limits, dt = (batch.q, batch.qdot), solution, model.limits, model.dt
     reach, n = numbers.reach, q.shape[1]
     lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
     for row in range(q.shape[0]):

@@ -112,25 +112,24 @@ def check_weights(name: str, weights: float | Sequence[float], joints: int) -> F
 
 
 @inner
-def task_motion(chain, kind, seen, memory):
+def task_motion(model, batch, memory):
     """Task Jacobians, the motion of the reference, and the present errors; the reference is remembered.
 
     Args:
-        chain: The model of the arm.
-        kind: The kind of task coordinates.
-        seen: The observations, a :class:`Seen`.
+        model: The :class:`Model`.
+        batch: The observations, a :class:`Batch`.
         memory: The :class:`NominalMemory`, turned into the next one in place.
 
     Returns:
         J (B, e, n), X^N(k+1) - X^N(k) and X^N(k) - x(k), both of shape (B, e).
     """
-    q, pose, nominal, before, known = seen.q, seen.pose, seen.nominal, memory.nominal, memory.known
+    kind, q, pose, nominal, before, known = model.kind, batch.q, batch.pose, batch.nominal, memory.nominal, memory.known
     rows, n = q.shape
     size = task_kernels.error_size(kind, pose.shape[1])
     jacobian, motion, error = np.empty((rows, size, n)), np.empty((rows, size)), np.empty((rows, size))
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     for row in range(rows):
-        forward_and_jacobian(chain, q[row], rotation, position, geometric)
+        forward_and_jacobian(model.chain, q[row], rotation, position, geometric)
         task_kernels.jacobian(kind, rotation, geometric, jacobian[row])
         present, target = before[row] if known[row] else pose[row], nominal[row, 0]
         task_kernels.error(kind, target, present, motion[row])
@@ -156,9 +155,9 @@ def add_feedback(gain, error, shift):
 
 
 @uncounted
-def finish(model, answer):
+def to_velocity(model, solution):
     """Turns joint shifts into velocities; one iteration was made."""
-    qdot, iterations = answer.qdot, answer.iterations
+    qdot, iterations = solution.qdot, solution.iterations
     for row in range(qdot.shape[0]):
         iterations[row] = 1
         for j in range(qdot.shape[1]):
@@ -166,7 +165,7 @@ def finish(model, answer):
 
 
 @uncounted
-def say_deficient(deficient, status):
-    """Statuses of rows by whether the Jacobian had lost rank. Shapes (B,)."""
+def set_status(deficient, status):
+    """Sets the statuses of rows by whether the Jacobian has lost rank. Shapes (B,)."""
     for row in range(status.shape[0]):
         status[row] = DEFICIENT if deficient[row] else APPLIED

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, finish, task_motion
+from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, add_feedback, task_motion, to_velocity
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve, damped_gram, transposed_product
 from ikgym.validation import Bounds
@@ -31,13 +31,13 @@ def damped_rows(jacobian, shift, damping, out):
 
 
 @kernel
-def dls_step(model, numbers, seen, memory, answer):
+def dls_step(model, numbers, batch, solution):
     """One step of :class:`DampedLeastSquares`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
-    damped_rows(jacobian, shift, numbers.damping, answer.qdot)
-    answer.status[:] = APPLIED
-    finish(model, answer)
+    damped_rows(jacobian, shift, numbers.damping, solution.qdot)
+    solution.status[:] = APPLIED
+    to_velocity(model, solution)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ import numpy as np
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,
-    finish,
     full_rank,
-    say_deficient,
+    set_status,
     task_motion,
+    to_velocity,
 )
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.linear_algebra import dot
@@ -81,14 +81,14 @@ def _take_off(rest, wanted, a, unit, given):
 
 
 @kernel
-def gram_schmidt_step(model, numbers, seen, memory, answer):
+def gram_schmidt_step(model, numbers, batch, solution):
     """One step of :class:`GramSchmidt`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
     deficient = np.empty(shift.shape[0], np.bool_)
-    orthonormal_rows(jacobian, shift, numbers.truncation, full_rank(jacobian), answer.qdot, deficient)
-    say_deficient(deficient, answer.status)
-    finish(model, answer)
+    orthonormal_rows(jacobian, shift, numbers.truncation, full_rank(jacobian), solution.qdot, deficient)
+    set_status(deficient, solution.status)
+    to_velocity(model, solution)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from baselines.solvers.resolved_rate.base import (
     APPLIED,
     ResolvedRate,
     add_feedback,
-    finish,
     full_rank,
-    say_deficient,
+    set_status,
     task_motion,
+    to_velocity,
 )
 from ikgym.kernels.jit import inner, kernel
 from ikgym.validation import Bounds, FloatArray, read_only
@@ -58,16 +58,16 @@ def transpose_rows(jacobian, shift, weights, tolerance, out, stuck):
 
 
 @kernel
-def transpose_step(model, numbers, seen, memory, answer):
+def transpose_step(model, numbers, batch, solution):
     """One step of :class:`JacobianTranspose`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
     stuck = np.empty(shift.shape[0], np.bool_)
-    transpose_rows(jacobian, shift, numbers.weights, numbers.rank_tolerance, answer.qdot, stuck)
-    say_deficient(stuck, answer.status)
+    transpose_rows(jacobian, shift, numbers.weights, numbers.rank_tolerance, solution.qdot, stuck)
+    set_status(stuck, solution.status)
     if shift.shape[1] != full_rank(jacobian):
-        answer.status[:] = APPLIED
-    finish(model, answer)
+        solution.status[:] = APPLIED
+    to_velocity(model, solution)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

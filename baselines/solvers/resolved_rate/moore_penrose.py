@@ -12,10 +12,10 @@ from baselines.policy.fields import derived
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,
-    finish,
     full_rank,
-    say_deficient,
+    set_status,
     task_motion,
+    to_velocity,
 )
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.linear_algebra import pseudoinverse_rows
@@ -23,18 +23,18 @@ from ikgym.validation import Bounds, FloatArray, read_only
 
 
 @kernel
-def pseudoinverse_step(model, numbers, seen, memory, answer):
+def pseudoinverse_step(model, numbers, batch, solution):
     """One step by the pseudoinverse, see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
-    root, qdot = numbers.root, answer.qdot
+    root, qdot = numbers.root, solution.qdot
     deficient = np.empty(qdot.shape[0], np.bool_)
     pseudoinverse_rows(jacobian / root, shift, numbers.tolerance, full_rank(jacobian), qdot, deficient)
-    say_deficient(deficient, answer.status)
+    set_status(deficient, solution.status)
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
             qdot[row, j] /= root[j]
-    finish(model, answer)
+    to_velocity(model, solution)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.policy.fields import derived
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
-from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, finish, full_rank, say_deficient, task_motion
+from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, full_rank, set_status, task_motion, to_velocity
 from baselines.solvers.resolved_rate.dls import damped_rows
 from baselines.solvers.resolved_rate.moore_penrose import MoorePenrose
 from ikgym.arms import Arm
@@ -35,11 +35,11 @@ def task_rows(jacobian, velocity, out):
 
 
 @kernel
-def null_space_step_among(model, numbers, seen, memory, answer):
+def null_space_step_among(model, numbers, batch, solution):
     """One step of :class:`NullSpace` among bodies; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
-    q, boxes, (shapes, checked) = seen.q, numbers.boxes, bodies_of(numbers.bodies)
+    q, boxes, (shapes, checked) = batch.q, numbers.boxes, bodies_of(numbers.bodies)
     aim, distances, reaches, gradients = np.empty(q.shape), np.empty(ROWS), np.empty(ROWS), np.empty((ROWS, q.shape[1]))
     objective_rows(numbers, model.dt, q, aim)
     work = near_work(q.shape[1], shapes.links.shape[0])
@@ -47,19 +47,19 @@ def null_space_step_among(model, numbers, seen, memory, answer):
         around_it = shapes, checked, boxes[row % boxes.shape[0]]
         count = near_distances(model.chain, *around_it, q[row], numbers.influence, work, distances, reaches, gradients)
         repel(distances, reaches, gradients, count, model.dt * numbers.repulsion, aim[row])
-    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
-    finish(model, answer)
+    aimed_rows(numbers, aim, jacobian, shift, solution.qdot, solution.status)
+    to_velocity(model, solution)
 
 
 @kernel
-def null_space_step(model, numbers, seen, memory, answer):
+def null_space_step(model, numbers, batch, solution):
     """One step of :class:`NullSpace`; see :class:`CompiledPolicy` for the arguments."""
-    jacobian, shift, error = task_motion(model.chain, model.kind, seen, memory)
+    jacobian, shift, error = task_motion(model, batch, solution.memory)
     add_feedback(numbers.gain, error, shift)
-    aim = np.empty(seen.q.shape)
-    objective_rows(numbers, model.dt, seen.q, aim)
-    aimed_rows(numbers, aim, jacobian, shift, answer.qdot, answer.status)
-    finish(model, answer)
+    aim = np.empty(batch.q.shape)
+    objective_rows(numbers, model.dt, batch.q, aim)
+    aimed_rows(numbers, aim, jacobian, shift, solution.qdot, solution.status)
+    to_velocity(model, solution)
 
 
 @kernel
@@ -80,7 +80,7 @@ def aimed_rows(numbers, aim, jacobian, shift, out, status):
     if numbers.damping == 0.0:  # with one pseudoinverse
         pseudoinverse_rows(jacobian, shift - disturbance, tolerance, rank, out, deficient)
         out += aim
-        say_deficient(deficient, status)
+        set_status(deficient, status)
         return
     taken_off = np.empty(aim.shape)
     damped_rows(jacobian, shift, numbers.damping, out)

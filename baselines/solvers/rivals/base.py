@@ -25,8 +25,8 @@ from ikgym.validation import FloatArray
 WHOLE_POSES = ("pose", "matrix")
 
 
-class Seen(NamedTuple):
-    """Observation of one arm for a solver.
+class Target(NamedTuple):
+    """Where a solver has to move one arm.
 
     The target is the model's present pose, moved as the tool has to move from its measured pose to the reference.
 
@@ -58,7 +58,7 @@ class StartMemory(NamedTuple):
 
 
 #: One step: joint velocities, or None where the solver finds none.
-Step = Callable[[Seen], FloatArray | None]
+Step = Callable[[Target], FloatArray | None]
 
 #: The packages' objects of the policies, for each thread: they change from call to call.
 _made = threading.local()
@@ -132,7 +132,7 @@ class Rival(SolverPolicy, abc.ABC):
         start, step = np.where(known[:, None], start, batch.q), self._step()
         qdot, status = np.zeros(batch.q.shape), statuses(len(start))
         for row, observed in enumerate(zip(batch.q, batch.qdot, start, batch.pose, batch.nominal[:, 0], strict=True)):
-            found = step(self.seen(*observed))
+            found = step(self.target(*observed))
             if found is None:
                 status[row] = Status.DIVERGED
             else:
@@ -140,7 +140,9 @@ class Rival(SolverPolicy, abc.ABC):
         kept = StartMemory(start, np.ones(len(start), dtype=np.bool_))
         return Solution(qdot, kept, status, np.ones(len(start), dtype=np.int64))
 
-    def seen(self, q: FloatArray, qdot: FloatArray, start: FloatArray, pose: FloatArray, nominal: FloatArray) -> Seen:
+    def target(
+        self, q: FloatArray, qdot: FloatArray, start: FloatArray, pose: FloatArray, nominal: FloatArray
+    ) -> Target:
         """The observation of one arm, from its measured task coordinates and those of the next step; shapes (m,)."""
         rotation, position = np.empty((3, 3)), np.empty(3)
         forward(self.problem.model.chain, q, rotation, position)
@@ -148,7 +150,7 @@ class Rival(SolverPolicy, abc.ABC):
             rotation = nominal[:9].reshape(3, 3) @ pose[:9].reshape(3, 3).T @ rotation
         elif self.problem.task.name == "axis":
             rotation = turn(pose[:3], nominal[:3]) @ rotation
-        return Seen(q, qdot, start, rotation, position + (nominal[-3:] - pose[-3:]))
+        return Target(q, qdot, start, rotation, position + (nominal[-3:] - pose[-3:]))
 
     def _step(self) -> Step:
         made = _made.__dict__.setdefault("steps", weakref.WeakKeyDictionary())

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import WHOLE_POSES, Seen, Step
+from baselines.solvers.rivals.base import WHOLE_POSES, Step, Target
 from baselines.solvers.rivals.model_files import TIP, geom_name, urdf
 from baselines.solvers.rivals.solids import Solids, solids_of
 from baselines.solvers.rivals.task_program import TaskProgram
@@ -59,15 +59,15 @@ class Roboplan(TaskProgram):
         limits = [kinematics.PositionLimit(oink, self.limit_gain), velocity, acceleration]
         barriers = self._barriers(kinematics, oink, scene, solids)
 
-        def step(seen: Seen) -> FloatArray | None:
-            pose[:3, :3], pose[:3, 3] = seen.rotation, seen.position
+        def step(target: Target) -> FloatArray | None:
+            pose[:3, :3], pose[:3, 3] = target.rotation, target.position
             frame.setTargetFrameTransform(pose)
             for task in posture:
-                task.setTargetConfiguration(seen.start)
-            acceleration.setLastVelocity(seen.qdot)
+                task.setTargetConfiguration(target.start)
+            acceleration.setLastVelocity(target.qdot)
             try:
                 # Made anew, since ProxQP goes on from its last step, and a policy depends on its observation alone.
-                kinematics.Oink(scene, settings).solveIk(seen.q, tasks, limits, barriers, moved, self.damping)
+                kinematics.Oink(scene, settings).solveIk(target.q, tasks, limits, barriers, moved, self.damping)
             except RuntimeError:
                 return None
             return moved / dt

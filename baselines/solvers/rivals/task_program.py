@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from baselines.solvers.rivals.base import Rival, Seen, Step
+from baselines.solvers.rivals.base import Rival, Step, Target
 from baselines.solvers.rivals.model_files import TIP, geom_name, joint_name, mjcf, urdf
 from baselines.solvers.rivals.solids import Solids, geometry_model, solids_of
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -136,13 +136,13 @@ class Pink(SolverProgram):
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping, "safety_break": False}
         options["barriers"] = self._barriers(pink, solids)
 
-        def step(seen: Seen) -> FloatArray | None:
-            configuration.update(seen.q)
-            frame.set_target(pinocchio.SE3(seen.rotation, seen.position))
+        def step(target: Target) -> FloatArray | None:
+            configuration.update(target.q)
+            frame.set_target(pinocchio.SE3(target.rotation, target.position))
             for task in posture:
-                task.set_target(seen.start)
+                task.set_target(target.start)
             for limit in acceleration:
-                limit.set_last_integration(seen.qdot, dt)
+                limit.set_last_integration(target.qdot, dt)
             try:
                 found: FloatArray = pink.solve_ik(configuration, tasks, dt, limits=limits, **options)
             except pink.exceptions.NoSolutionFound:
@@ -192,11 +192,11 @@ class Mink(SolverProgram):
         dt, options = self.problem.dt, {"solver": self.solver, "damping": self.damping}
         pose = np.eye(4)
 
-        def step(seen: Seen) -> FloatArray | None:
-            configuration.update(seen.q)
-            pose[:3, :3], pose[:3, 3] = seen.rotation, seen.position
+        def step(target: Target) -> FloatArray | None:
+            configuration.update(target.q)
+            pose[:3, :3], pose[:3, 3] = target.rotation, target.position
             for task in posture:
-                task.set_target(seen.start)
+                task.set_target(target.start)
             frame.set_target(mink.SE3.from_matrix(pose))
             try:
                 found: FloatArray = mink.solve_ik(configuration, tasks, dt, limits=limits, **options)

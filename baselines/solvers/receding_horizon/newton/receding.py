@@ -64,55 +64,55 @@ PERIODS, CANDIDATE_STEPS, TRIED, FAR = range(4)
 
 
 @kernel
-def plan_step(model, numbers, seen, memory, answer):
+def plan_step(model, numbers, batch, solution):
     """Plans one period for each of B arms; see :class:`CompiledPolicy` for the arguments.
 
     The iterations are the Newton steps made, those of initial guesses and candidates among them.
     """
-    plan_rows(model, numbers, seen, memory, answer, None)
+    plan_rows(model, numbers, batch, solution, None)
 
 
 @kernel
-def plan_step_among(model, numbers, seen, memory, answer):
+def plan_step_among(model, numbers, batch, solution):
     """The same among bodies, with the obstacles held still over the horizon where they will be after the step."""
     shapes, checked = bodies_of(numbers.bodies)
     influence = numbers.clearance + INFLUENCE
     clearance = Clearance(shapes, numbers.boxes, checked, numbers.sweep, numbers.clearance, influence)
-    plan_rows(model, numbers, seen, memory, answer, clearance)
+    plan_rows(model, numbers, batch, solution, clearance)
 
 
 @expanded
-def plan_rows(model, numbers, seen, memory, answer, clearance):
+def plan_rows(model, numbers, batch, solution, clearance):
     """:func:`plan_step` with a :class:`bodies.Clearance`, whose boxes are those of each row or of all, or with None."""
     settings = settings_of(numbers.reals, numbers.integers)
-    knots, n, plans = settings.at.shape[0], seen.q.shape[1], memory.plans
+    knots, n, plans = settings.at.shape[0], batch.q.shape[1], solution.memory.plans
     limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n
-    workspace = plan_workspace(model.kind, seen.nominal.shape[2], knots, n, width, limited, clearance)
-    plan_batch(model, settings, seen, memory, answer, clearance, workspace)
+    workspace = plan_workspace(model.kind, batch.nominal.shape[2], knots, n, width, limited, clearance)
+    plan_batch(model, settings, batch, solution, clearance, workspace)
 
 
 @uncounted
-def plan_batch(data, settings, observations, memory, answers, clearance, workspace):
+def plan_batch(data, settings, batch, solution, clearance, workspace):
     """Plans one period for each of B arms; the settings are :class:`PlanSettings`, other arguments as above."""
-    plans, counts, before = memory
+    plans, counts, before = solution.memory
     limited = settings.change_limit.shape[0] > 0
     around = clearance
-    for row in range(observations.q.shape[0]):
-        q, qdot_before, count = observations.q[row], observations.qdot[row], counts[row]
+    for row in range(batch.q.shape[0]):
+        q, qdot_before, count = batch.q[row], batch.qdot[row], counts[row]
         if clearance is not None:  # the obstacles of this row
             first = row % clearance.boxes.shape[0]
             boxes = clearance.boxes[first : first + 1]
             around = Clearance(
                 clearance.shapes, boxes, clearance.checked, clearance.sweep, clearance.margin, clearance.influence
             )
-        grid, old_grid = _grids(settings, observations.remaining[row], workspace)
+        grid, old_grid = _grids(settings, batch.remaining[row, 0], workspace)
         # Where the horizon ends with the episode nothing comes behind it.
-        braking = not settings.stop_at_end or observations.remaining[row] > settings.at[-1]
+        braking = not settings.stop_at_end or batch.remaining[row, 0] > settings.at[-1]
         problem = PathProblem(
             data,
             grid,
             q,
-            observations.nominal[row],
+            batch.nominal[row],
             qdot_before,
             settings.rate_weight,
             settings.change_limit,
@@ -129,11 +129,11 @@ def plan_batch(data, settings, observations, memory, answers, clearance, workspa
             before[row, j] = q[j]
         minimum, made = _plan_row(problem, settings, old_grid, plans[row], count, workspace)
         count[PERIODS] += 1
-        kept = _first_velocity(problem, plans[row, 0], answers.qdot[row])
-        kept = keep_clear(around, problem, answers.qdot[row], workspace.newton.clearance) and kept
+        kept = _first_velocity(problem, plans[row, 0], solution.qdot[row])
+        kept = keep_clear(around, problem, solution.qdot[row], workspace.newton.clearance) and kept
         count[FAR] = 0 if kept or settings.recovery_steps == 0 else count[FAR] + 1
-        answers.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
-        answers.iterations[row] = made
+        solution.status[row] = (_CONVERGED if minimum.outcome == CONVERGED else _LIMIT) if kept else _SATURATED
+        solution.iterations[row] = made
 
 
 @expanded

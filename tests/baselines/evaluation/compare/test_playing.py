@@ -46,13 +46,13 @@ def test_times_of_a_library_are_those_of_its_own_calls(monkeypatch):
     pytest.importorskip("mink")
     monkeypatch.setattr(playing, "PREFERRED", ("dls", "mink"))
     monkeypatch.setattr(library_times, "STEPS", 5)
-    seen = Rival.seen
+    target = Rival.target
 
     def slow(policy, *observed):
         time.sleep(0.02)
-        return seen(policy, *observed)
+        return target(policy, *observed)
 
-    monkeypatch.setattr(Rival, "seen", slow)
+    monkeypatch.setattr(Rival, "target", slow)
     found = compare(ikgym.scenarios.get("panda-circle").replace(steps=6))
     times = {row.policy: row.time_p50_us for row in found.rows if row.scenario == playing.AS_IT_IS}
     assert times["mink"] < 15e3
