@@ -7,9 +7,13 @@
 
 from __future__ import annotations
 
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
 import gymnasium as gym
 
-from ikgym import arms, exceptions, obstacles, problems, rl, scenarios, tasks, trajectories
+from ikgym import arms, exceptions, obstacles, problems, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.env import RedundantIKEnv
@@ -18,6 +22,9 @@ from ikgym.kernels import rotations
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.vector_env import RedundantIKVectorEnv
+
+if TYPE_CHECKING:
+    from ikgym import rl
 
 __all__ = [
     "Arm",
@@ -42,10 +49,36 @@ __all__ = [
 
 __version__ = "0.2.0"
 
+# Learning environments, see ikgym.rl.ids: steps of an episode, and the mean return of `dls` with a score of 0.8, of
+# ``python -m benchmarks.yardsticks``.
+_LEARNING = {
+    "Reach": (100, 70.0),
+    "Track": (200, 170.0),
+    "Fast": (200, 95.0),
+    "Limits": (200, 165.0),
+    "Camera": (300, 105.0),
+    "Payload": (300, 175.0),
+}
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Imports `ikgym.rl` when it is first used: solvers do not need it."""
+    if name == "rl":
+        return importlib.import_module("ikgym.rl")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 if "RedundantIK-v0" not in gym.registry:
     gym.register(
         id="RedundantIK-v0",
         entry_point="ikgym.env:RedundantIKEnv",
         vector_entry_point="ikgym.vector_env:RedundantIKVectorEnv",
     )
-    rl.ids.register()
+    for _name, (_steps, _threshold) in _LEARNING.items():
+        gym.register(
+            id=f"ikgym/{_name}-v0",
+            entry_point=f"ikgym.rl.ids:{_name}Env",
+            vector_entry_point=f"ikgym.rl.ids:{_name.lower()}_arms",
+            reward_threshold=_threshold,
+            max_episode_steps=_steps,
+        )

@@ -76,6 +76,7 @@ def test_no_mode_imports_no_matplotlib_and_pictures_import_no_pyplot(loaded):
 def test_a_command_imports_what_the_command_line_names(loaded):
     modules = loaded["evaluate"]
     assert not LARGE & modules
+    assert [name for name in modules if name.startswith(("ikgym.rl", "ikgym.arms.urdf"))] == []
     others = ("agents", "viewer", "training", "papers", "tuning", "solvers.receding_horizon", "solvers.adaptive")
     assert [name for name in modules if name.startswith(tuple(f"baselines.{one}" for one in others))] == []
     solvers = {name.split(".")[2] for name in modules if name.startswith("baselines.solvers.")}

@@ -7,14 +7,18 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from ikgym.arms import catalogue
 from ikgym.arms.arm import Arm
 from ikgym.arms.bodies import Bodies
-from ikgym.arms.denavit_hartenberg import from_dh
-from ikgym.arms.urdf import Tip, from_urdf, tips
 from ikgym.registry import Registry
+
+if TYPE_CHECKING:
+    from ikgym.arms.denavit_hartenberg import from_dh
+    from ikgym.arms.urdf import Tip, from_urdf, tips
 
 __all__ = ["SHIPPED", "Arm", "Bodies", "Tip", "from_dh", "from_urdf", "get", "names", "register", "tips"]
 
@@ -23,6 +27,14 @@ for _name, _make in catalogue.read().items():
     _registry.register(_name, _make)
 #: The arms of this package, which files may refer to by name.
 SHIPPED = frozenset(_registry.names())
+# Conversions, imported when they are first used, and their modules.
+_CONVERSIONS = {"from_dh": "denavit_hartenberg", "Tip": "urdf", "from_urdf": "urdf", "tips": "urdf"}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _CONVERSIONS:
+        return getattr(importlib.import_module(f"{__name__}.{_CONVERSIONS[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def get(name: str) -> Arm:

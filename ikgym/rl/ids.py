@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import gymnasium as gym
-
 from ikgym import scenarios
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError, UnexpectedArgumentError, UnknownNameError
@@ -26,9 +24,6 @@ class TaskEnv(LearningEnv):
     """
 
     task: Task
-    #: Steps of an episode, and the mean return of `dls` with a score of 0.8, of ``python -m benchmarks.yardsticks``.
-    steps: ClassVar[int]
-    reward_threshold: ClassVar[float]
     metadata: ClassVar[dict[str, Any]] = {**RedundantIKEnv.metadata, "render_fps": 100}  # type: ignore[misc]
 
     def __init__(self, render_mode: str | None = None, **changes: Any) -> None:
@@ -60,10 +55,10 @@ class TaskEnv(LearningEnv):
             task = cls.task.replace(**changes)
         except UnknownNameError as e:
             raise UnexpectedArgumentError(f"got an unexpected keyword argument {e.name!r}. {e}") from None
-        scenario = scenarios.find(task.scenario)
-        if scenario.steps != cls.steps:
+        scenario, steps = scenarios.find(task.scenario), scenarios.find(cls.task.scenario).steps
+        if scenario.steps != steps:
             raise InvalidInputError(
-                f"scenario: expected {cls.steps} steps, where Gymnasium ends the episodes of this id, got "
+                f"scenario: expected {steps} steps, where Gymnasium ends the episodes of this id, got "
                 f"{scenario.steps} of {scenario.name!r}; ikgym.rl.make and make_vec take any scenario."
             )
         return task
@@ -85,11 +80,7 @@ class ReachEnv(TaskEnv):
     | score | of the last 50 steps |
     """
 
-    task, steps, reward_threshold = (
-        Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, coarse=0.3, counted=50),
-        100,
-        70.0,
-    )
+    task = Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, coarse=0.3, counted=50)
     metadata: ClassVar[dict[str, Any]] = {**TaskEnv.metadata, "render_fps": 50}  # type: ignore[misc]
 
 
@@ -129,7 +120,7 @@ class TrackEnv(TaskEnv):
     :func:`ikgym.rl.score` of the costs of whole episodes: 0 is an arm that stands still, 1 is tuned `dls`.
     """
 
-    task, steps, reward_threshold = Task(), 200, 170.0
+    task = Task()
 
 
 class FastEnv(TaskEnv):
@@ -145,7 +136,7 @@ class FastEnv(TaskEnv):
     | reward | Φ^U counts velocities above 0.3 rad/s |
     """
 
-    task, steps, reward_threshold = Task(scenario="learning-fast"), 200, 95.0
+    task = Task(scenario="learning-fast")
 
 
 class LimitsEnv(TaskEnv):
@@ -161,7 +152,7 @@ class LimitsEnv(TaskEnv):
     | observation space | `Box(-5.0, 5.0, (38,), float32)` |
     """
 
-    task, steps, reward_threshold = Task(scenario="learning-limits", share=1.0), 200, 165.0
+    task = Task(scenario="learning-limits", share=1.0)
 
 
 class CameraEnv(TaskEnv):
@@ -181,7 +172,7 @@ units of the velocity limit |
     | episode end | truncated after 300 steps |
     """
 
-    task, steps, reward_threshold = Task(scenario="learning-camera", history=4, commands=4, share=0.5), 300, 105.0
+    task = Task(scenario="learning-camera", history=4, commands=4, share=0.5)
 
 
 class PayloadEnv(TaskEnv):
@@ -201,7 +192,7 @@ units of the velocity limit |
     | episode end | truncated after 300 steps |
     """
 
-    task, steps, reward_threshold = Task(scenario="learning-payload", history=4, commands=4, share=0.5), 300, 175.0
+    task = Task(scenario="learning-payload", history=4, commands=4, share=0.5)
 
 
 #: The environments by id.
@@ -211,16 +202,3 @@ IDS: dict[str, type[TaskEnv]] = {
 }
 reach_arms, track_arms, fast_arms = ReachEnv.arms, TrackEnv.arms, FastEnv.arms
 limits_arms, camera_arms, payload_arms = LimitsEnv.arms, CameraEnv.arms, PayloadEnv.arms
-
-
-def register() -> None:
-    """Registers the ids with Gymnasium, which takes native vectors of them as well."""
-    for name, kind in IDS.items():
-        short = kind.__name__.removesuffix("Env").lower()
-        gym.register(
-            id=name,
-            entry_point=f"{__name__}:{kind.__name__}",
-            vector_entry_point=f"{__name__}:{short}_arms",
-            reward_threshold=kind.reward_threshold,
-            max_episode_steps=kind.steps,
-        )

@@ -15,7 +15,6 @@ from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
 from ikgym.arms.limits import farthest, velocity_scale
-from ikgym.arms.urdf import open_meshes
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
@@ -123,7 +122,10 @@ class Scenario(Frozen):
         self._settle(model=self.arm if self.model is None else self.model)
         with about(f"Scenario {shortened(self.name)}"):
             super().__post_init__()
-        if self.collisions is True or (self.collisions is None and self.obstacles not in ((), [])):
+        collides = self.collisions is True or (self.collisions is None and self.obstacles not in ((), []))
+        if collides and self.arm.urdf is not None:
+            from ikgym.arms.urdf import open_meshes  # arms without a file need no reader of files
+
             arm = open_meshes(self.arm)
             self._settle(model=arm if self.model is self.arm else self.model, arm=arm)
         self._check_parts()
