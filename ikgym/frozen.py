@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import inspect
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,12 +59,16 @@ class Frozen:
 @functools.cache
 def hints_of(kind: Any) -> dict[str, Any]:
     """The annotations of a class and its bases, with all that :data:`typing.Annotated` adds."""
-    hints: dict[str, Any] = {}
-    for base in reversed(kind.__mro__):
-        # Those of a user's class may name things that are known to type checkers alone.
-        with contextlib.suppress(NameError, AttributeError):
-            hints |= typing.get_type_hints(base, include_extras=True)
-    return hints
+    return {name: hint for base in reversed(kind.__mro__) for name, hint in _annotations(base).items()}
+
+
+@functools.cache
+def _annotations(kind: Any) -> dict[str, Any]:
+    """The annotations of a class without those of its bases."""
+    # Those of a user's class may name things that are known to type checkers alone.
+    with contextlib.suppress(NameError, AttributeError):
+        return inspect.get_annotations(kind, eval_str=True)
+    return {}
 
 
 @functools.cache
@@ -74,9 +79,8 @@ def checks_of(kind: Any) -> Mapping[str, tuple[Check, bool]]:
     """
     found: dict[str, tuple[Check, bool]] = {}
     for base in reversed(kind.__mro__):
-        hints = hints_of(base)
-        for name in filter(hints.__contains__, vars(base).get("__annotations__", ())):
-            check, optional = _check(hints[name])
+        for name, hint in _annotations(base).items():
+            check, optional = _check(hint)
             if check or name in found:
                 found[name] = check or found[name][0], optional
     return {f.name: found[f.name] for f in dataclasses.fields(kind) if f.init and f.name in found}
