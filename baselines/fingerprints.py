@@ -16,7 +16,7 @@ from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
 #: Fields of a scenario that change no result: texts, and fields that matter only where bodies may not touch.
-APART = {"name", "policy", "source", "obstacles", "collisions", "proximity"}
+APART = {"name", "policy", "source", "jerk_limit", "obstacles", "collisions", "proximity"}
 #: Numbers in arrays, mostly of the order of 1, count up to here.
 DECIMALS = 12
 
@@ -32,6 +32,8 @@ def fingerprint(scenario: Scenario) -> str:
         parts["collisions"] = [scenario.arm.bodies, scenario.obstacles]
     if scenario.proximity is not None:
         parts["proximity"] = scenario.proximity
+    if np.isfinite(scenario.jerk_limit).any():
+        parts["jerk_limit"] = scenario.jerk_limit
     parts |= _of_plant(parts.pop("plant"))
     if scenario.start is None and not scenario.starts_nominally:
         parts["start"] = ["near home", scenario.arm.home]
@@ -75,8 +77,9 @@ def _canonical(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _canonical(getattr(value, f.name)) for f in dataclasses.fields(value) if f.init}
         if isinstance(value, Arm):
-            # Home posture and names of joints move nothing, nor do bodies, where touching does not matter.
-            del fields["home"], fields["joint_names"], fields["bodies"]
+            # Home posture and names of joints move nothing, nor do bodies, where touching does not matter. A limit
+            # of jerk is the scenario's.
+            del fields["home"], fields["joint_names"], fields["bodies"], fields["jerk_limit"]
         if isinstance(value, Bodies):
             del fields["unseen"]  # nothing, wherever touching matters
         if isinstance(value, Arm) and not value.limited:

@@ -24,8 +24,8 @@ _SATURATED, _DIVERGED = int(Status.SATURATED), int(Status.DIVERGED)
 #: Result of a call for observations that are not finite; otherwise that of :func:`cut_rows`.
 REFUSED = 2
 
-# The row of :attr:`Model.limits` behind those of an arm.
-BRAKING = CHANGE + 1
+# The rows of :attr:`Model.limits` behind those of an arm.
+BRAKING, JERK = CHANGE + 1, CHANGE + 2
 # The bits of the exponent: all of them are set in infinities and in NaN, and nowhere else.
 _EXPONENT = 0x7FF0000000000000
 
@@ -60,8 +60,9 @@ class Model(NamedTuple):
         dt: Δt in [s].
         velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         limits: Least and largest joint coordinates in [rad] or [m], then in [rad/s] or [m/s] the largest velocities,
-            their largest changes in one step, and those that braking may use; infinite where there is no limit. The
-            rows are LOWER, UPPER, FASTEST and CHANGE of :mod:`ikgym.kernels.limits`, and BRAKING. Shape (5, n).
+            their largest changes in one step, those that braking may use, and by how much these may differ from step
+            to step; infinite where there is no limit. The rows are LOWER, UPPER, FASTEST and CHANGE of
+            :mod:`ikgym.kernels.limits`, BRAKING and JERK. Shape (6, n).
     """
 
     chain: Chain
@@ -88,6 +89,8 @@ class Batch(NamedTuple):
             observed. Shape (B, h, n).
         obstacles: Obstacles as they will be after the coming step, see :class:`ikgym.kernels.bodies.Surroundings`;
             None where they are always the same. Shape (B, o, 16).
+        change: By how much ``qdot`` differs from the velocities before, where a policy remembers it for limits of jerk.
+            Shape (B, n).
     """
 
     q: Floats
@@ -99,6 +102,7 @@ class Batch(NamedTuple):
     pose_age: Floats | None = None
     commands: Floats | None = None
     obstacles: Floats | None = None
+    change: Floats | None = None
 
 
 class Solution(NamedTuple):
@@ -133,7 +137,7 @@ def model_block(model: Model) -> Floats:
 def model_of(block):
     """The :class:`Model` in a block from :func:`model_block`."""
     n = int(block[0])
-    limits, offsets = 8 + n, 8 + 6 * n
+    limits, offsets = 8 + n, 8 + 7 * n
     axes, prismatic, tool, rotation = offsets + 3 * n, offsets + 6 * n, offsets + 7 * n, offsets + 7 * n + 3
     chain = Chain(
         block[offsets:axes].reshape(n, 3),
@@ -143,7 +147,7 @@ def model_of(block):
         block[rotation:].reshape(3, 3),
     )
     cost = CostParameters(block[3], block[4], block[5], block[6], block[7])
-    return Model(chain, int(block[1]), cost, block[2], block[8:limits], block[limits:offsets].reshape(5, n))
+    return Model(chain, int(block[1]), cost, block[2], block[8:limits], block[limits:offsets].reshape(6, n))
 
 
 def compile_step(step: Any, numbers: type, memory: type, remembers: bool, cuts: bool) -> Any:
@@ -176,23 +180,23 @@ def compile_step(step: Any, numbers: type, memory: type, remembers: bool, cuts: 
 
 def _call(block: Any, numbers: Any, checking: Any, observation: Any, memory: Any, out: Any, counts: Any) -> Any:
     """See :func:`compile_step`: each solver has a copy with its ``step``, ``NumbersTuple`` and ``MemoryTuple``."""
-    q, last, pose, nominal, remaining = observation
-    if checking and not all_finite(q, last, pose, nominal, remaining):
+    q, qdot, pose, nominal, remaining = observation
+    if checking and not all_finite(q, qdot, pose, nominal, remaining):
         return REFUSED
     model, n, m = model_of(block), int(block[0]), nominal.shape[1]
     rows = q.shape[0] // n
+    applied = qdot.reshape(rows, n)
+    change = applied
     if remembers:  # type: ignore[name-defined]  # noqa: F821
-        command, memory = memory[-1].reshape(-1), memory[:-1]
-        for i in range(command.shape[0]):
-            if math.isnan(command[i]):
-                command[i] = last[i]
-        last = command
+        last, memory = memory[-1], memory[:-1]
+        begin_rows(last, applied)
+        applied = change = last
+        if last.shape[1] > n:
+            applied, change = last[:, :n].copy(), last[:, n:].copy()
     qdot = np.empty(rows * n) if cuts else out  # type: ignore[name-defined]  # noqa: F821
     ahead = nominal.reshape(rows, nominal.shape[0] // max(rows, 1), m)
-    extras = None, None, None, None
-    batch = Batch(
-        q.reshape(rows, n), last.reshape(rows, n), pose.reshape(rows, m), ahead, remaining.reshape(rows, 1), *extras
-    )
+    seen = q.reshape(rows, n), applied, pose.reshape(rows, m), ahead, remaining.reshape(rows, 1)
+    batch = Batch(*seen, None, None, None, None, change)
     solution = Solution(qdot.reshape(rows, n), MemoryTuple(*memory), counts[0], counts[1])  # type: ignore[name-defined]  # noqa: F821
     step(model, NumbersTuple(*numbers), batch, solution)  # type: ignore[name-defined]  # noqa: F821
     if not cuts:  # type: ignore[name-defined]  # noqa: F821
@@ -200,8 +204,24 @@ def _call(block: Any, numbers: Any, checking: Any, observation: Any, memory: Any
     action = out.reshape(rows, n)
     result = cut_rows(solution.qdot, model.velocity_limit, action, solution.status)
     if remembers:  # type: ignore[name-defined]  # noqa: F821
-        sent_rows(model, batch.q, action, batch.qdot)
+        sent_rows(model, batch.q, action, last)
     return result
+
+
+@kernel
+def begin_rows(last, qdot):
+    """Fills in remembered commands where an episode begins, and they are NaN: the observed velocity, and no change.
+
+    Args:
+        last: The commands in [rad/s] or [m/s], and then by how much they changed, where that is remembered. Shape
+            (B, n) or (B, 2 n).
+        qdot: Observed joint velocities in [rad/s] or [m/s]. Shape (B, n).
+    """
+    n = qdot.shape[1]
+    for row in range(last.shape[0]):
+        for j in range(last.shape[1]):
+            if math.isnan(last[row, j]):
+                last[row, j] = qdot[row, j] if j < n else 0.0
 
 
 @kernel
@@ -212,12 +232,16 @@ def sent_rows(model, q, action, last):
         model: The :class:`Model`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         action: Shape (B, n).
-        last: Velocities of the step before in [rad/s] or [m/s]; becomes those of this one. Shape (B, n).
+        last: Velocities of the step before in [rad/s] or [m/s], and their changes where these are remembered; becomes
+            those of this one. Shape (B, n) or (B, 2 n).
     """
-    limits, limit, dt = model.limits, model.velocity_limit, model.dt
+    limits, limit, dt, n = model.limits, model.velocity_limit, model.dt, q.shape[1]
     for row in range(q.shape[0]):
-        for j in range(q.shape[1]):
-            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * limit[j], last[row, j], dt)
+        for j in range(n):
+            before = last[row, j]
+            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * limit[j], before, dt)
+            if last.shape[1] > n:
+                last[row, n + j] = last[row, j] - before
 
 
 @kernel

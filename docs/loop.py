@@ -1,8 +1,8 @@
 """The table `loop`: the control loop on drives with delay and lag.
 
-The Panda, without limits of acceleration as from a URDF file, moves its tool on a circle of 0.1 m at 0.1 m/s for two
-seconds. Errors count after the first one. A command is compared with the largest velocity that the same joint has on
-perfect drives.
+The Panda, without limits of acceleration and jerk as from a URDF file, moves its tool on a circle of 0.1 m at 0.1 m/s
+for two seconds. Errors count after the first one. A command is compared with the largest velocity that the same joint
+has on perfect drives.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def circle(arm: ikgym.Arm, start: npt.ArrayLike, period: float, seconds: float =
     rotation, position = arm.forward(start)
     path = Circle(position - 0.1 * UPRIGHT[:, 0], 0.1, rotation=UPRIGHT)
     trajectory = PathTrajectory(path, Trapezoidal(0.1, 0.5), FixedOrientation(rotation))
-    fields: dict[str, Any] = {"dt": period, "steps": round(seconds / period), "start": start}
+    fields: dict[str, Any] = {"dt": period, "steps": round(seconds / period), "start": start, "jerk_limit": np.inf}
     return ikgym.Scenario("loop", arm, ikgym.tasks.get("pose"), trajectory, **fields)
 
 

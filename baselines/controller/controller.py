@@ -17,6 +17,7 @@ from baselines.controller.reference import Pose, coordinates, coordinates_ahead,
 from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import remembered
+from baselines.policy_kernels import JERK
 from baselines.spec import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
@@ -104,7 +105,8 @@ class Controller:
         n = self._joints
         self._state: Memory | None = None
         self._stopped: StopReason | None = None
-        self._last, self._kept, self._counters = np.zeros(n), np.zeros((2, n)), np.zeros(3)
+        self._last, self._moved = np.zeros(n), np.zeros(n)
+        self._kept, self._counters = np.zeros((2, n)), np.zeros(3)
         self._made = 0
 
     def step(
@@ -265,13 +267,14 @@ class Controller:
             return self._braked()
         self._made += 1
         out = np.empty_like(q)
-        kernels.command(self._limits, q, action[0], self._unit, self._last, self._problem.dt, self._kept, out)
+        made = self._last, self._moved
+        kernels.command(self._limits, q, action[0], self._unit, *made, self._problem.dt, self._kept, out)
         return out
 
     def _braked(self) -> FloatArray:
         """The next command of a stop. Shape (n,)."""
         out = np.empty_like(self._last)
-        kernels.brake(self._change, self._last, out)
+        kernels.brake(self._change, self._limits[JERK], self._last, self._moved, out)
         return out
 
     def _play(self, calls: int) -> list[float]:

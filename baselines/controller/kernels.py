@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from baselines.policy_kernels import all_finite
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import smooth_box, stopping_change
 from ikgym.kernels import tasks
 from ikgym.kernels.jit import kernel
 
@@ -86,33 +86,47 @@ def _errors(kind, nominal, pose):
 
 
 @kernel
-def command(limits, q, action, unit, last, dt, kept, out):
+def command(limits, q, action, unit, last, change, dt, kept, out):
     """The joint velocities that limits make of an action.
 
     Args:
-        limits: See :class:`baselines.policy_kernels.Model`. Shape (5, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (6, n).
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         action: Shape (n,).
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         last: Joint velocities of the last command, changed in place. Shape (n,).
+        change: By how much they differed from those before, changed in place. Shape (n,).
         dt: Δt in [s].
         kept: See :func:`watch`, changed in place. Shape (2, n).
         out: Receives joint velocities in [rad/s] or [m/s]. Shape (n,).
     """
     n = q.shape[0]
     lower, upper = np.empty(n), np.empty(n)
-    velocity_box(limits, dt, q, last, lower, upper)
+    smooth_box(limits, dt, q, last, change, lower, upper)
     for j in range(n):
         out[j] = min(max(action[j] * unit[j], lower[j]), upper[j])
+        change[j] = out[j] - last[j]
         last[j] = out[j]
         kept[TRAVEL, j] += dt * out[j]
 
 
 @kernel
-def brake(change, last, out):
-    """A step of a stop: velocities change by so much at most. Shapes (n,); ``last`` is changed in place."""
+def brake(most, steps, last, change, out):
+    """A step of a stop.
+
+    Args:
+        most: The largest changes of the velocities in a period, in [rad/s] or [m/s]. Shape (n,).
+        steps: The largest changes of these from period to period, inf where there is no limit of jerk. Shape (n,).
+        last: Joint velocities of the last command, changed in place. Shape (n,).
+        change: By how much they differed from those before, changed in place. Shape (n,).
+        out: Receives joint velocities in [rad/s] or [m/s]. Shape (n,).
+    """
     for j in range(last.shape[0]):
-        last[j] = math.copysign(max(abs(last[j]) - change[j], 0.0), last[j])
+        if steps[j] < math.inf:
+            change[j] = stopping_change(last[j], change[j], most[j], steps[j])
+            last[j] += change[j]
+        else:
+            last[j] = math.copysign(max(abs(last[j]) - most[j], 0.0), last[j])
         out[j] = last[j]
 
 

@@ -19,6 +19,9 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.validation import FloatArray
 
+#: The place of the obstacles in a :class:`Batch`.
+OBSTACLES = Batch._fields.index("obstacles")
+
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
     """Base of solvers that are one kernel, ``step(model, numbers, batch, solution)``.
@@ -71,7 +74,9 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         _, call, block, numbers, _ = self._kernel
         qdot, counts = np.empty(rows * n), np.empty((2, rows), np.int64)
         kept, parts = tuple([array.copy() for array in memory]), self._flat(batch)
-        last = (batch.qdot,) if self.remembers_command else ()  # :meth:`SolverPolicy.act` has put it there
+        # :meth:`SolverPolicy.act` has put the last command there.
+        command = batch.qdot if batch.change is None else np.concatenate([batch.qdot, batch.change], axis=1)
+        last = (command,) if self.remembers_command else ()
         if self.sees_extras:
             parts, numbers = self._with_obstacles(parts, numbers)
         call(block, numbers, False, parts, (*kept, *last), qdot, counts)
@@ -113,7 +118,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         q, qdot, pose, nominal, remaining = parts[: len(OBSERVED)]
         ahead = nominal.reshape(-1, nominal.shape[2])
         flat = q.reshape(-1), qdot.reshape(-1), pose.reshape(-1), ahead, remaining.reshape(-1)
-        return (*flat, parts[-1]) if self.sees_extras else flat
+        return (*flat, parts[OBSTACLES]) if self.sees_extras else flat
 
     def _with_obstacles(self, parts: Parts, numbers: tuple[Any, ...]) -> tuple[Parts, tuple[Any, ...]]:
         """The five arrays of an observation, and the numbers with the obstacles that it shows."""

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from baselines.policy_kernels import Model, model_block, model_of
+from baselines.policy_kernels import JERK, Model, model_block, model_of
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.frozen import Frozen
@@ -34,6 +34,8 @@ class Problem(Frozen):
         velocity_limit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         surroundings: The obstacles as they are at the start; None where touching does not matter.
         obstacles_shown: Whether observations show the obstacles, which are others at each step or in each episode.
+        jerk_limit: Largest changes of the joint accelerations in [rad/s³] or [m/s³], inf where there is none; None for
+            none. Shape (n,).
     """
 
     model: Arm
@@ -43,6 +45,7 @@ class Problem(Frozen):
     velocity_limit: FloatArray
     surroundings: Surroundings | None = None
     obstacles_shown: bool = False
+    jerk_limit: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self._settle(velocity_limit=frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,)))
@@ -54,14 +57,25 @@ class Problem(Frozen):
 
     @functools.cached_property
     def limits(self) -> FloatArray:
-        """The limits as kernels take them, see :class:`baselines.policy_kernels.Model`. Shape (5, n).
+        """The limits as kernels take them, see :class:`baselines.policy_kernels.Model`. Shape (6, n).
 
-        Braking may use a little less than the acceleration limit: a joint that brakes as hard as it can cannot make up
-        for the rounding of its actions, and would touch its stop.
+        Braking may use a little less than the limits of acceleration and jerk: a joint that brakes as hard as it can
+        cannot make up for the rounding of its actions, and would touch its stop. A jerk that changes the acceleration
+        from one end to the other within a step is no limit.
         """
         change = self.dt * self.model.acceleration_limit
         braking = np.maximum(change - 2.0 * ROUNDING * self.velocity_limit, 0.5 * change)
-        return read_only(np.array([self.model.lower, self.model.upper, self.largest_qdot, change, braking]))
+        jerk = self.dt * self.dt * (np.inf if self.jerk_limit is None else self.jerk_limit)
+        steps = np.where(
+            jerk < 2.0 * change, np.maximum(jerk - 4.0 * ROUNDING * self.velocity_limit, 0.5 * jerk), np.inf
+        )
+        model = self.model
+        return read_only(np.array([model.lower, model.upper, self.largest_qdot, change, braking, steps]))
+
+    @property
+    def jerk_limited(self) -> bool:
+        """Whether any joint has a limit of jerk that matters at this period."""
+        return bool(np.isfinite(self.limits[JERK]).any())
 
     @functools.cached_property
     def kernel_block(self) -> FloatArray:
@@ -86,6 +100,6 @@ class Problem(Frozen):
         """The problem of a scenario."""
         usual = scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit
         if not scenario.collides:
-            return cls(*usual)
+            return cls(*usual, jerk_limit=scenario.jerk_limit)
         model = scenario.model.replace(bodies=scenario.arm.bodies)
-        return cls(model, *usual[1:], scenario.surroundings, scenario.obstacles_shown)
+        return cls(model, *usual[1:], scenario.surroundings, scenario.obstacles_shown, scenario.jerk_limit)

@@ -30,7 +30,7 @@ from baselines.policy.arguments import (
 )
 from baselines.policy.problem import Problem
 from baselines.policy.sharing import divided, undivided
-from baselines.policy_kernels import Batch, Memory, Solution, all_finite, cut_rows, sent_rows
+from baselines.policy_kernels import Batch, Memory, Solution, all_finite, begin_rows, cut_rows, sent_rows
 from ikgym.frozen import Frozen
 from ikgym.kernels.compilation import announced
 from ikgym.kernels.outcome import OBSERVED
@@ -65,6 +65,8 @@ class SolverPolicy(Frozen, abc.ABC):
     sees_extras: ClassVar[bool] = True
     #: Whether it keeps acceleration limits, if there are any, see :attr:`remembers_command`.
     keeps_acceleration: ClassVar[bool] = False
+    #: Whether it keeps limits of jerk as well.
+    keeps_jerk: ClassVar[bool] = False
     #: Whether `predict` accepts the observations of several arms at once.
     batched: ClassVar[bool] = True
     #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
@@ -131,12 +133,19 @@ class SolverPolicy(Frozen, abc.ABC):
         command is what an ideal arm makes of the last action, and NaN where an episode begins: there the observed
         velocity counts.
         """
-        return self.keeps_acceleration and bool(np.isfinite(self.problem.model.acceleration_limit).any())
+        limited = bool(np.isfinite(self.problem.model.acceleration_limit).any())
+        return self.remembers_change or (self.keeps_acceleration and limited)
+
+    @functools.cached_property
+    def remembers_change(self) -> bool:
+        """Whether it also remembers by how much the last command differed from the one before, for limits of jerk."""
+        return self.keeps_jerk and self.problem.jerk_limited
 
     def initial_memory(self, rows: int) -> Memory:
         """The memory at the start of an episode as states have it: behind it the last command, if remembered."""
         memory = self.memory(rows)
-        return (*memory, np.full((rows, self.problem.model.joints), np.nan)) if self.remembers_command else memory
+        width = self.problem.model.joints * (2 if self.remembers_change else 1)
+        return (*memory, np.full((rows, width), np.nan)) if self.remembers_command else memory
 
     def recall(self, memory: Memory, qdot: FloatArray) -> Memory:
         """A memory with another last command: for wrappers and control loops, which know what was sent.
@@ -145,7 +154,13 @@ class SolverPolicy(Frozen, abc.ABC):
             memory: As :meth:`initial_memory` or the last call gave it.
             qdot: In [rad/s] or [m/s]. Shape (B, n).
         """
-        return (*memory[:-1], qdot) if self.remembers_command else memory
+        if not self.remembers_command:
+            return memory
+        *most, last = memory
+        if self.remembers_change:
+            n = qdot.shape[1]
+            qdot = np.concatenate([qdot, last[:, n:] + (qdot - last[:, :n])], axis=1)
+        return (*most, qdot)
 
     @abc.abstractmethod
     def solve(self, batch: Batch, memory: Memory) -> Solution:
@@ -202,8 +217,11 @@ class SolverPolicy(Frozen, abc.ABC):
         problem, last = self.problem, np.empty(0)
         if self.remembers_command:
             *most, last = memory
-            last = np.where(np.isnan(last), batch.qdot, last)
-            batch, memory = batch._replace(qdot=last.copy()), tuple(most)
+            last = last.copy()
+            begin_rows(last, batch.qdot)
+            n, memory = batch.q.shape[1], tuple(most)
+            change = last[:, n:].copy() if self.remembers_change else None
+            batch = batch._replace(qdot=last[:, :n].copy(), change=change)
         qdot, kept, status, iterations = self._solve(batch, memory)
         action, status = np.empty(qdot.shape, np.float32), status.copy()
         lost = cut_rows(qdot, problem.velocity_limit, action, status)

@@ -31,7 +31,7 @@ from ikgym.validation import (
 )
 
 #: Fields that say nothing of the geometry.
-FACTS = frozenset(("name", "lower", "upper", "velocity_limit", "acceleration_limit", "home"))
+FACTS = frozenset(("name", "lower", "upper", "velocity_limit", "acceleration_limit", "jerk_limit", "home"))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -61,6 +61,8 @@ class Arm(Frozen):
         home: A posture away from limits and singularities in [rad] or [m], or None. Shape (n,).
         joint_names: Names of the joints in exported data, n different texts; ``joint_1``, ``joint_2``, … by default.
         bodies: Spheres and capsules on its links, for :meth:`clearance` and for scenarios with collisions.
+        jerk_limit: Largest changes of an acceleration in [rad/s³] or [m/s³], inf where there is none. Kept by
+            policies and by the control loop, see :attr:`ikgym.Scenario.jerk_limit`, and not by the plant. Shape (n,).
 
     Raises:
         InvalidInputError: A shape, an axis, an orientation, a limit or a joint's name is wrong, home is outside the
@@ -80,6 +82,7 @@ class Arm(Frozen):
     home: FloatArray | None = None
     joint_names: Sequence[str] = ()
     bodies: Bodies = Bodies()  # noqa: RUF009  # frozen
+    jerk_limit: FloatArray = None  # type: ignore[assignment]  # none
     chain: Chain = dataclasses.field(init=False, repr=False)
     #: The URDF file that the arm was read from, None for all other arms and for copies that differ by more than
     #: :data:`FACTS`.
@@ -97,7 +100,7 @@ class Arm(Frozen):
             raise InvalidInputError("expected at least one joint, got none.")
         float_array("axes", self.axes, (n, 3))
         ends = {"lower": -np.inf, "upper": np.inf}
-        fastest = {"velocity_limit": np.inf, "acceleration_limit": np.inf}
+        fastest = {"velocity_limit": np.inf, "acceleration_limit": np.inf, "jerk_limit": np.inf}
         self._settle(
             prismatic=checks.truth_values("prismatic", self.prismatic, n),
             joint_names=checks.joint_names("joint_names", self.joint_names, n),

@@ -49,7 +49,9 @@ def joint_names(name: str, given: Any, n: int) -> tuple[str, ...]:
     return numbered_joints(n) if isinstance(given, (tuple, list)) and not given else different_texts(name, given, n)
 
 
-def limits(name: str, value: npt.ArrayLike | None, n: int, default: float, *, positive: bool = False) -> FloatArray:
+def limits(
+    name: str, value: npt.ArrayLike | None, n: int, default: float = np.inf, *, positive: bool = False
+) -> FloatArray:
     """Limits of the joints, which may be infinite, read-only. Shape (n,)."""
     if value is None:
         return read_only(np.full(n, default))

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.arms.arm import Arm
+from ikgym.arms.checks import limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
 
@@ -29,6 +30,12 @@ def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
         )
     limit = arm.velocity_limit if given is None else given
     return per_joint("velocity_limit", limit, arm.joints, at_least=SMALLEST, at_most=LARGEST)
+
+
+def jerk_limits(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
+    """The limits of jerk in [rad/s³] or [m/s³], inf for none: those given, else the arm's. Shape (n,)."""
+    limit = arm.jerk_limit if given is None else given
+    return limits("jerk_limit", np.full(arm.joints, limit) if np.ndim(limit) == 0 else limit, arm.joints, positive=True)
 
 
 def farthest(arm: Arm) -> FloatArray:

@@ -233,6 +233,8 @@ def _plain_arm(arm: Arm, folder: pathlib.Path) -> str | Table:
     if arm.name in arms.SHIPPED and _same(arm, arms.get(arm.name)):
         return arm.name
     numbers = _fields(arm, folder)
+    if not np.isfinite(arm.jerk_limit).any():
+        del numbers["jerk_limit"]
     if arm.joint_names == numbered_joints(arm.joints):
         del numbers["joint_names"]
     return _urdf(arm, folder) or numbers

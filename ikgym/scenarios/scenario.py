@@ -14,7 +14,7 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from ikgym.arms import Arm
-from ikgym.arms.limits import farthest, velocity_scale
+from ikgym.arms.limits import farthest, jerk_limits, velocity_scale
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
@@ -92,6 +92,9 @@ class Scenario(Frozen):
         proximity: The cost of bodies that come near, in a scenario with collisions; none by default.
         policy: A policy that follows the path closely, such as ``"sns"``: the default of commands that show episodes.
         source: Origin of the scenario.
+        jerk_limit: Largest changes of the joint accelerations in [rad/s³] or [m/s³], which the policies `qp`, `qp_path`
+            and `sns` and the control loop keep; no limit of the plant. A number, or one a joint; inf for none. By
+            default those of the arm.
 
     Lengths, angles and velocities are at most 1e12; Δt and velocity limits are at least 1e-12, too.
 
@@ -117,6 +120,7 @@ class Scenario(Frozen):
     proximity: ProximityCost | None = None
     policy: str | None = None
     source: str = ""
+    jerk_limit: FloatArray = None  # type: ignore[assignment]  # that of the arm
 
     def __post_init__(self) -> None:
         self._settle(model=self.arm if self.model is None else self.model)
@@ -130,6 +134,7 @@ class Scenario(Frozen):
             self._settle(model=arm if self.model is self.arm else self.model, arm=arm)
         self._check_parts()
         self._settle(velocity_limit=velocity_scale(self.arm, self.velocity_limit))
+        self._settle(jerk_limit=jerk_limits(self.arm, self.jerk_limit))
         if self.start is not None:
             self._settle(start=frozen_array("start", self.start, (self.joints,), at_most=LARGEST))
         elif self.random and not self.starts_nominally:
@@ -227,7 +232,7 @@ class Scenario(Frozen):
         """A copy with some fields changed, checked like a new one.
 
         A new arm is its own model if none is given. If an action of 1 meant the old arm's velocity limits, it means
-        those of the new arm, where all of them are finite.
+        those of the new arm, where all of them are finite. An arm with other limits of jerk brings these.
 
         Raises:
             UnknownNameError: There is no field of that name.
@@ -239,6 +244,8 @@ class Scenario(Frozen):
         limits_of_arm = np.array_equal(self.velocity_limit, self.arm.velocity_limit)
         if limits_of_arm and isinstance(arm, Arm) and np.isfinite(arm.velocity_limit).all():
             changes.setdefault("velocity_limit", None)
+        if isinstance(arm, Arm) and not np.array_equal(arm.jerk_limit, self.arm.jerk_limit):
+            changes.setdefault("jerk_limit", None)
         return super().replace(**changes)
 
     def save(self, file: str | os.PathLike[str]) -> None:
@@ -256,7 +263,10 @@ class Scenario(Frozen):
         """
         if type(self) is not Scenario:
             raise InvalidInputError(f"save: expected a Scenario itself, got a {type(self).__name__}.")
-        files.save(self._fields(), file)
+        fields = dict(self._fields())
+        if np.array_equal(self.jerk_limit, self.arm.jerk_limit):
+            fields["jerk_limit"] = None
+        files.save(fields, file)
 
     @property
     def cut_off(self) -> float:

@@ -83,6 +83,8 @@ class PredictedMemory(NamedTuple):
         off: How far the arm was from where the simulated drives should have brought it in the last steps, in [rad] or
             [m]. Shape (B, n, SPAN).
         spread: Running sums of the squared changes of that over one step and over SPAN steps. Shape (B, n, 2).
+        moved: By how much the last command differed from the one before, in [rad/s] or [m/s]. Shape (B, n).
+        aimed: The velocity that the last command should have led to, where jerk is limited, likewise. Shape (B, n).
     """
 
     begun: BoolArray
@@ -103,6 +105,8 @@ class PredictedMemory(NamedTuple):
     fastest: FloatArray
     off: FloatArray
     spread: FloatArray
+    moved: FloatArray
+    aimed: FloatArray
 
 
 def longest_lead(delay: FloatArray) -> int:
@@ -139,6 +143,8 @@ def start_memory(rows: int, coordinates: int, hypotheses: Hypotheses, oldest: in
         np.zeros((rows, n)),
         np.zeros((rows, n, SPAN)),
         np.zeros((rows, n, 2)),
+        np.zeros((rows, n)),
+        np.zeros((rows, n)),
     )
 
 

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.solvers.adaptive.drives import SAMPLES, SPAN, TOTAL, mixture
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import reachable_change, smooth_box
 from ikgym.kernels.jit import inlined, kernel
 from ikgym.validation import LARGEST, FloatArray
 
+#: Steps in which a limited jerk lets a drive catch up with a velocity that it has missed.
+PATIENCE = 10.0
 #: Share of the largest acceleration that corrects an error.
 SHARE = 0.2
 #: Commands within this share of the largest velocity are never too fast.
@@ -31,6 +33,7 @@ class Servo(NamedTuple):
         unit: Joint velocity of an action of 1, in [rad/s] or [m/s]. Shape (n,).
         largest: The largest velocities in [rad/s] or [m/s]. Shape (n,).
         change: How much they change at most in a step; inf where there is no limit. Shape (n,).
+        steps: By how much these changes may differ from step to step; inf where jerk has no limit. Shape (n,).
         overdrive: Largest ratio of a command to the velocities wanted lately; inf where that does not matter.
     """
 
@@ -39,6 +42,7 @@ class Servo(NamedTuple):
     unit: FloatArray
     largest: FloatArray
     change: FloatArray
+    steps: FloatArray
     overdrive: float
 
 
@@ -81,7 +85,7 @@ def move_rows(limits, dt, wanted, q, qdot):
     """Moves arms that have limits, but no delay and no lag.
 
     Args:
-        limits: See :class:`baselines.policy_kernels.Model`. Shape (5, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (6, n).
         dt: Δt in [s].
         wanted: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
         q: Joint coordinates now and 1, 2, … steps ago, in [rad] or [m], changed in place. Shape (B, A, n).
@@ -90,7 +94,7 @@ def move_rows(limits, dt, wanted, q, qdot):
     n = q.shape[2]
     lower, upper = np.empty(n), np.empty(n)
     for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row, 0], qdot[row, 0], lower, upper)
+        smooth_box(limits, dt, q[row, 0], qdot[row, 0], qdot[row, 0] - qdot[row, 1], lower, upper)
         for i in range(q.shape[1] - 1, 0, -1):
             q[row, i], qdot[row, i] = q[row, i - 1], qdot[row, i - 1]
         for j in range(n):
@@ -108,6 +112,9 @@ def follow_rows(off, lags, servo, memory, qdot):
     ever more. The gain is raised up to :func:`kalman_gain`. A command is at most ``overdrive`` times as fast as the
     wanted velocity of the last second, or slow: the inverse of a lag turns steps, and a wrong one errors, into peaks.
 
+    Where jerk is limited the gain is not raised, and a velocity that a drive has missed is made up for in PATIENCE
+    steps: the inverse of a lag multiplies an error, and commands that cannot change so fast would swing.
+
     Args:
         off: How far the arm is from where the simulated drives should have brought it, in [rad] or [m]. Shape (B, n).
         lags: T of the simulated drives. Shape (n, L).
@@ -115,8 +122,9 @@ def follow_rows(off, lags, servo, memory, qdot):
         memory: A plain :class:`PredictedMemory`, changed in place.
         qdot: Receives the commands in [rad/s] or [m/s]. Shape (B, n).
     """
-    gain, dt, unit, largest, change, overdrive = servo
-    velocity, path, fastest, past, spread = memory[2], memory[3], memory[15], memory[16], memory[17]
+    gain, dt, unit, largest, change, steps, overdrive = servo
+    velocity, path, fastest, past, spread, moved = memory[2], memory[3], memory[15], memory[16], memory[17], memory[18]
+    aimed = memory[19]
     samples, delay, lag, doubt, sent, lead, arm_q, arm_qdot = memory[6:14]
     for row in range(qdot.shape[0]):
         for j in range(qdot.shape[1]):
@@ -133,19 +141,27 @@ def follow_rows(off, lags, servo, memory, qdot):
             accelerated = min(change[j], LARGEST) * size  # 0 without an error, also where there is no limit
             slow = min(gain * size, math.sqrt(SHARE * accelerated))
             useful = kalman_gain(off[row, j], samples[row], past[row, j], spread[row, j])
-            raised = min(gain_of(gain, doubt[row, j, TOTAL]), useful)
+            raised = min(gain_of(gain, doubt[row, j, TOTAL]), useful) if steps[j] == np.inf else gain
             fast = min(raised * size, math.sqrt(min(SHARE, 0.5 * (a + b)) * accelerated))
             target = wanted + math.copysign(max(slow, fast), error)
+            if steps[j] < np.inf:  # only what the target gains is made in one step
+                speed = (1.0 - share) * speeds[low] + share * speeds[high]
+                aimed[row, j], target = target, speed + target - aimed[row, j] + (aimed[row, j] - speed) / PATIENCE
             free = (1.0 - share - a) * speeds[low] + (share - b) * speeds[high]
             command, last = (target - free) / (a + b), sent[row, j]
             fastest[row, j] = max((1.0 - dt / REMEMBERED) * fastest[row, j], abs(wanted))
             if overdrive < np.inf:
                 most = max(overdrive * fastest[row, j], SLOW * largest[j])
                 command = min(max(command, -most), most)
-            command = min(max(command, last - change[j]), last + change[j])
+            least, greatest = last - change[j], last + change[j]
+            if steps[j] < np.inf:
+                least = last - reachable_change(-moved[row, j], largest[j] + last, change[j], steps[j])
+                greatest = last + reachable_change(moved[row, j], largest[j] - last, change[j], steps[j])
+            command = min(max(command, least), greatest)
             qdot[row, j] = min(max(command, -largest[j]), largest[j])
             # The command is a float32 share of the unit.
             sent[row, j] = np.float32(qdot[row, j] / unit[j]) * unit[j]
+            moved[row, j] = sent[row, j] - last
             for k in range(places.shape[0] - 1, 0, -1):
                 for f in range(speeds.shape[0]):
                     places[k, f] = places[k - 1, f]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Problem, Solution
+from baselines.policy_kernels import JERK
 from baselines.solvers.adaptive.drives import (
     DELAY,
     Hypotheses,
@@ -175,7 +176,7 @@ class Predicted(NamedWrapper):
         change = np.array(model.acceleration_limit * problem.dt)
         overdrive = math.inf if self.overdrive is None else self.overdrive
         unit, largest = np.array(problem.velocity_limit), np.array(problem.largest_qdot)
-        servo = Servo(self.gain, problem.dt, unit, largest, change, overdrive)
+        servo = Servo(self.gain, problem.dt, unit, largest, change, problem.limits[JERK].copy(), overdrive)
         return self.inner.problem.limits, tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:

@@ -159,7 +159,7 @@ def _row(row, model, numbers, batch, task, bodies, program, near, work, solution
     count = near_distances(model.chain, *args, places, distances, reaches, rows)
     for j in range(q.shape[0]):
         preferred[j] = pull[0, j] * (pull[1, j] - q[j])
-    weight = row_program(model, numbers, q, batch.qdot[row], jac, shift, error, preferred, program)
+    weight = row_program(model, numbers, q, batch.qdot[row], batch.change[row], jac, shift, error, preferred, program)
     task_free(hessian, weight, projection)
     left = keep_clear(model, numbers, q, projection, count, near, motion, away)
     for j in range(q.shape[0]):

@@ -65,6 +65,7 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     pull: FloatArray = derived()
 
     keeps_acceleration: ClassVar[bool] = True
+    keeps_jerk: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -24,7 +24,7 @@ from baselines.solvers.quadratic_program.program import (
     motion_weight,
     weigh_rotation,
 )
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED
 from baselines.status import Status
 from ikgym.kernels import tasks
@@ -61,7 +61,7 @@ def path_step(model, numbers, batch, solution):
         speed = _path_ahead(
             model, numbers, samples, progress, memory.speed[row], batch.pose[row], q[row], jac, motion, missing
         )
-        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        smooth_box(limits, dt, q[row], last[row], batch.change[row], lower, upper)
         for j in range(n):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
         weigh_rotation(model.kind, numbers.rotation_weight, jac, motion, missing)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from baselines.solvers.quadratic_program.velocity_box import braking_speed, velocity_box
+from baselines.solvers.quadratic_program.velocity_box import braking_speed, smooth_box
 from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve, transposed_product
@@ -199,7 +199,7 @@ def held_back(jacobian, shift, weight, weights, preferred, qdot, lower, upper, b
 
 
 @inner
-def row_program(model, numbers, q, last, jacobian, motion, error, preferred, program):
+def row_program(model, numbers, q, last, change, jacobian, motion, error, preferred, program):
     """The program of one arm: its bounds, H and g; the task shift takes the place of the motion of the reference.
 
     Args:
@@ -207,6 +207,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         numbers: The fields of :class:`QuadraticProgram`.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
         last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
+        change: By how much they differed from those before. Shape (n,).
         jacobian: J, which becomes J Δt with the weight of the rotation. Shape (e, n).
         motion: Motion of the reference, which becomes the task shift Δx. Shape (e,).
         error: The present error, which becomes the share of it that is taken back. Shape (e,).
@@ -217,7 +218,7 @@ def row_program(model, numbers, q, last, jacobian, motion, error, preferred, pro
         Weight of the joint motion.
     """
     hessian, linear, lower, upper = program
-    velocity_box(model.limits, model.dt, q, last, lower, upper)
+    smooth_box(model.limits, model.dt, q, last, change, lower, upper)
     if numbers.rotation_weight != 1.0:
         weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
     for a in range(error.shape[0]):

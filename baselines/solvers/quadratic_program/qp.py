@@ -33,7 +33,9 @@ def qp_step(model, numbers, batch, solution):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
         jac, shift = jacobian[row], motion[row]
         parts = hessian, linear, lower, upper
-        weight = row_program(model, numbers, q[row], batch.qdot[row], jac, shift, error[row], preferred, parts)
+        weight = row_program(
+            model, numbers, q[row], batch.qdot[row], batch.change[row], jac, shift, error[row], preferred, parts
+        )
         iterations[row], found = box_minimum(hessian, linear, lower, upper, x)
         for j in range(n):
             qdot[row, j] = x[j]

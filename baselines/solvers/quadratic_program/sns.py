@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.policy.fields import derived
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
-from baselines.solvers.quadratic_program.velocity_box import velocity_box
+from baselines.solvers.quadratic_program.velocity_box import smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
@@ -97,7 +97,7 @@ def sns_step(model, numbers, batch, solution):
     reach, n = numbers.reach, q.shape[1]
     lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
     for row in range(q.shape[0]):
-        velocity_box(limits, dt, q[row], last[row], lower, upper)
+        smooth_box(limits, dt, q[row], last[row], batch.change[row], lower, upper)
         jac = jacobian[row]
         jac *= dt * reach
         lower /= reach
@@ -149,6 +149,7 @@ class SaturationInNullSpace(ResolvedRate):
 
     name: ClassVar[str] = "sns"
     keeps_acceleration: ClassVar[bool] = True
+    keeps_jerk: ClassVar[bool] = True
     step = sns_step
 
     def __post_init__(self) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
-from baselines.policy_kernels import BRAKING
+from baselines.policy_kernels import BRAKING, JERK
 from ikgym.kernels.jit import inlined, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER
+
+# Most steps of a stop, and halvings of the range of velocities from which a joint can stop in time.
+LONGEST, HALVINGS = 100_000, 24
 
 
 @inlined
@@ -58,3 +61,113 @@ def velocity_box(limits, dt, q, last, lower, upper):
         slowest, quickest = last[j] - change, last[j] + change
         upper[j] = min(max(most, slowest), quickest)
         lower[j] = min(max(least, slowest), quickest)
+
+
+@inlined
+def stopping_change(velocity, change, most, step):
+    """The next change of a velocity on the fastest way to rest, with a bounded jerk.
+
+    The velocity reaches 0 together with its change: the last changes shrink by ``step`` each, as the velocities do in
+    :func:`braking_speed`. A velocity that cannot help to pass through 0 comes back.
+
+    Args:
+        velocity: v of the last step, in [rad/s] or [m/s].
+        change: By how much it differed from the one before.
+        most: The largest change in one step; inf where there is no limit.
+        step: The largest change of that from step to step.
+    """
+    needed = min(most, braking_speed(abs(velocity), step))
+    return min(max(-math.copysign(needed, velocity), change - step), change + step)
+
+
+@inlined
+def reachable_change(change, room, most, step):
+    """The largest next change of a velocity that has so much room to its limit, with a bounded jerk.
+
+    The changes that follow it can shrink to 0 before the limit. ``change`` is the last one; for the others see
+    :func:`stopping_change`.
+    """
+    return min(most, change + step, max(braking_speed(max(room, 0.0), step), change - step))
+
+
+@uncounted
+def stopping_way(velocity, change, most, step):
+    """How far a joint still comes forward on the fastest way to rest: the way divided by Δt; see the arguments there.
+
+    The steps of the largest change, of which there are many, are taken at once.
+    """
+    way, farthest, whole = 0.0, 0.0, 0.0
+    if most < math.inf:
+        ramps = math.ceil(most / step) - 1.0
+        whole = most + ramps * most - 0.5 * step * ramps * (ramps + 1.0)  # that a change from `most` to 0 makes
+    for _ in range(LONGEST):
+        if velocity <= 0.0 and change <= 0.0:
+            break
+        change = stopping_change(velocity, change, most, step)
+        velocity += change
+        way += velocity
+        if change == -most and velocity > whole:
+            times = math.floor((velocity - whole) / most) + 1.0
+            way += times * velocity - 0.5 * most * times * (times + 1.0)
+            velocity -= times * most
+        farthest = max(farthest, way)
+    return farthest
+
+
+@uncounted
+def _fastest_forward(room, velocity, change, most, step, limit):
+    """The largest next velocity from which a joint can stop within its room, with a bounded jerk.
+
+    Args:
+        room: The way to the stop, divided by Δt, in [rad/s] or [m/s].
+        velocity: v of the last step, in [rad/s] or [m/s].
+        change: By how much it differed from the one before.
+        most: The largest change in one step; inf where there is no limit.
+        step: The largest change of that from step to step.
+        limit: The largest velocity.
+    """
+    low = velocity + stopping_change(velocity, change, most, step)
+    high = max(min(velocity + reachable_change(change, limit - velocity, most, step), limit), low)
+    if room == math.inf or high + stopping_way(high, high - velocity, most, step) <= room:
+        return high
+    if low + stopping_way(low, low - velocity, most, step) > room:
+        return low
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if middle + stopping_way(middle, middle - velocity, most, step) <= room:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@uncounted
+def smooth_box(limits, dt, q, last, change, lower, upper):
+    """Least and largest joint velocities of the next step, with a bounded jerk where there is a limit of it.
+
+    As :func:`velocity_box`, for joints whose row JERK of the limits is finite: whatever velocity of the box is chosen,
+    the next box is not empty, and the fastest stop (:func:`stopping_change`) lies in it. Where limits contradict each
+    other, since the joint was too fast before or its measurement has moved, jerk comes first, then acceleration.
+
+    Args:
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (6, n).
+        dt: Δt in [s].
+        q: Joint coordinates in [rad] or [m]. Shape (n,).
+        last: The joint velocities of the step before in [rad/s] or [m/s]. Shape (n,).
+        change: By how much they differed from those before. Shape (n,).
+        lower: Receives the least velocities in [rad/s] or [m/s], never above the largest. Shape (n,).
+        upper: Receives the largest. Shape (n,).
+    """
+    velocity_box(limits, dt, q, last, lower, upper)
+    for j in range(q.shape[0]):
+        if limits[JERK, j] < math.inf:
+            most, step, fastest, v, d = limits[BRAKING, j], limits[JERK, j], limits[FASTEST, j], last[j], change[j]
+            above, below = (limits[UPPER, j] - q[j]) / dt, (q[j] - limits[LOWER, j]) / dt
+            quickest, slowest = v + min(most, d + step), v - min(most, step - d)
+            # The fastest stop lies between both.
+            upper[j] = _fastest_forward(above, v, d, most, step, fastest)
+            lower[j] = -_fastest_forward(below, -v, -d, most, step, fastest)
+            if above < 0.0:  # beyond a stop: led back
+                upper[j] = min(max(above, -fastest, lower[j]), quickest)
+            elif below < 0.0:
+                lower[j] = max(min(-below, fastest, upper[j]), slowest)

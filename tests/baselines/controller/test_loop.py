@@ -38,6 +38,45 @@ def test_unknown_drives(name, dt, delay):
     assert not any(controller.drives.at_least)
 
 
+def jerks(commands, scenario):
+    """The largest share of the limits of acceleration and of jerk, from rest on."""
+    rest = np.zeros((1, commands.shape[1]))
+    changes = np.diff(commands, axis=0, prepend=rest)
+    steps = np.diff(changes, axis=0, prepend=rest)
+    return (np.abs(changes) / scenario.dt / scenario.arm.acceleration_limit).max(), (
+        np.abs(steps) / scenario.dt**2 / scenario.arm.jerk_limit
+    ).max()
+
+
+@pytest.mark.parametrize("drives", [Drives(2, LAG), Drives(3, 0.04), Drives(0, 0.005), Drives()])
+def test_commands_keep_the_limits_of_jerk(drives):
+    """On drives that are identified, with a reference that starts at full acceleration; without them they do not."""
+    scenario = circle("panda", seconds=1.5).replace(jerk_limit=None)
+    controller = Controller(scenario)
+    errors, commands = played(controller, scenario, drives)
+    assert controller.stopped is None
+    assert max(jerks(commands, scenario)) <= 1.0 + 1e-6
+    assert errors[1300:].max() < 5e-5
+    if drives.time_constant:
+        free = scenario.replace(jerk_limit=np.inf)
+        assert jerks(played(Controller(free), free, drives)[1], free)[1] > 1.0
+
+
+def test_a_stop_keeps_the_limits_of_jerk():
+    scenario = circle("panda").replace(jerk_limit=None)
+    controller = Controller(scenario, "dls", drives=Drives())
+    nominal, q, commands = scenario.nominal(0, controller.ahead), scenario.first_q(scenario.trajectory), []
+    for k in range(600):
+        commands.append(
+            controller.step(q * (np.nan if k >= 300 else 1.0), None, nominal[k + 1 : k + 1 + controller.ahead])
+        )
+        q = q + scenario.dt * commands[-1]
+    assert controller.stopped is not None
+    assert np.abs(commands[299]).max() > 0.1
+    assert (commands[-1] == 0.0).all()
+    assert max(jerks(np.array(commands), scenario)) <= 1.0 + 1e-6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", range(4))
 @pytest.mark.parametrize("dt", [1e-3, 4e-3])

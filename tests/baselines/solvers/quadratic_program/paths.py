@@ -34,7 +34,14 @@ def beyond_reach(dt=1e-3):
 def _scenario(arm, path, law, dt, wait, **changes):
     trajectory = PathTrajectory(path, law, FixedOrientation(arm.forward(arm.home)[0]))
     steps = int(np.ceil((trajectory.duration + wait) / dt))
-    given = {"task": ikgym.tasks.get("pose"), "dt": dt, "steps": steps, "start": arm.home, **changes}
+    given = {
+        "task": ikgym.tasks.get("pose"),
+        "dt": dt,
+        "steps": steps,
+        "start": arm.home,
+        "jerk_limit": np.inf,
+        **changes,
+    }
     return ikgym.Scenario("path", arm, trajectory=trajectory, **given)
 
 
