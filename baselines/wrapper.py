@@ -30,8 +30,8 @@ class Wrapper(SolverPolicy, abc.ABC):
         step = self.ask(batch, inside)
         return self.solution(step.qdot, own, step)
 
-    The inner policy acts as if it were alone: values not finite or beyond the velocity limit are dealt with as its own
-    `predict` does. Its memory stands behind the wrapper's own.
+    The inner policy acts as if it were alone: values not finite or beyond the velocity limit are dealt with as in
+    its `predict`. Its memory follows that of the wrapper.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -41,12 +41,12 @@ class Wrapper(SolverPolicy, abc.ABC):
     inner: SolverPolicy | None = dataclasses.field(init=False, repr=False)
 
     def own_memory(self, rows: int) -> Memory:
-        """The wrapper's own memory at the start of B episodes, preferably a NamedTuple; arrays of shape (B, …)."""
+        """The wrapper's memory at the start of B episodes, preferably a NamedTuple; arrays of shape (B, …)."""
         del rows
         return ()
 
     def memory(self, rows: int) -> Memory:
-        """The wrapper's own memory, then that of the inner policy."""
+        """The wrapper's memory, then that of the inner policy."""
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.initial_memory(rows))
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
@@ -61,18 +61,18 @@ class Wrapper(SolverPolicy, abc.ABC):
         return *own, *(() if self.inner is None else self.inner.recall(inside, qdot))
 
     def own_restarted(self, own: Any, rows: npt.NDArray[np.bool_]) -> Memory:
-        """The wrapper's own memory, cleared where an episode begins."""
+        """The wrapper's memory, cleared where an episode begins."""
         return replace_rows(own, self.own_memory(len(rows)), rows)
 
     def split(self, memory: Memory) -> tuple[Any, Memory]:
-        """The wrapper's own part of its memory, of the type of :meth:`own_memory`, and that of the inner policy."""
+        """The wrapper's part of the memory, of the type of :meth:`own_memory`, and that of the inner policy."""
         size, kind = self._own
         own = memory[:size]
         return own if kind is tuple else kind._make(own), memory[size:]
 
     @functools.cached_property
     def _own(self) -> tuple[int, Any]:
-        """Number of arrays in the wrapper's own memory, and its type."""
+        """Number of arrays in the wrapper's memory, and its type."""
         own = self.own_memory(1)
         return len(own), type(own)
 
@@ -87,13 +87,13 @@ class Wrapper(SolverPolicy, abc.ABC):
 
         Args:
             qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-            own: The wrapper's own memory after the step.
+            own: The wrapper's memory after the step.
             step: The inner policy's.
         """
         return Solution(qdot, (*own, *step.memory), step.status, step.iterations)
 
     def inner_state(self, state: Memory) -> Memory:
-        """The state of the inner policy, as its own `predict` would have returned it, in that of the wrapper."""
+        """The state of the inner policy, as its `predict` would have returned it, in that of the wrapper."""
         size, _ = self._own
         return pack(*self.report(state), remembered(state)[size:])
 
@@ -104,7 +104,7 @@ class Wrapper(SolverPolicy, abc.ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class NamedWrapper(Wrapper, abc.ABC):
-    """A wrapper that is told by a parameter which policy it wraps.
+    """A wrapper of the policy that a parameter names.
 
     Args:
         problem: The scenario as the policy knows it.
@@ -158,7 +158,7 @@ class NamedWrapper(Wrapper, abc.ABC):
 
 
 def policies_in(spec: PolicySpec) -> Iterator[type[SolverPolicy]]:
-    """The classes of all policies that a spec names: its own, and those of inner policies.
+    """The classes of all policies that a spec names: the outermost, and those of inner policies.
 
     Args:
         spec: Such as ``"smoothed:policy=dls"``.

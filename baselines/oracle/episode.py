@@ -10,7 +10,7 @@ from gymnasium.utils import seeding
 
 from baselines.episodes import Simulation, rollouts
 from baselines.policy import Problem, SolverPolicy
-from baselines.policy.surroundings import swept
+from baselines.policy.surroundings import sweep_bodies
 from baselines.policy_kernels import Model
 from baselines.recording import add_up
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
@@ -190,4 +190,4 @@ def _clearance(scenario: Scenario, seed: int) -> Clearance | None:
     own = scenario.replace(obstacles=scenario.obstacles_of(seed))
     boxes, checked = own.obstacle_rows(scenario.steps + 1), own.surroundings.checked
     shapes = scenario.arm.bodies.shapes
-    return Clearance(shapes, boxes, checked, swept(scenario.arm), CLEARANCE, CLEARANCE + INFLUENCE)
+    return Clearance(shapes, boxes, checked, sweep_bodies(scenario.arm), CLEARANCE, CLEARANCE + INFLUENCE)

@@ -27,7 +27,7 @@ def bodies_block(shapes: Shapes, checked: BoolArray) -> FloatArray:
     return np.concatenate([counts, *map(np.ravel, shapes), checked.ravel()]).astype(np.float64)
 
 
-def swept(arm: Arm) -> FloatArray:
+def sweep_bodies(arm: Arm) -> FloatArray:
     """How far each joint of an arm moves each body at most within the limits, in [m] per unit. Shape (k, n)."""
     travel = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
     return sweep(arm, np.where(arm.prismatic, np.minimum(travel, LARGEST), 0.0), 0.0)

@@ -29,7 +29,8 @@ class Calibrated(ArmFilters):
         history, blend: See :class:`Corrected`.
         zero, link, axis, start, keep: See :class:`ArmFilters`.
         pose_noise: Standard deviation of each part of a measured position, in [m]. Above 0.
-        pose_rotation_noise: The same of the orientation, in [rad] (or as a number, for parts of a rotation matrix).
+        pose_rotation_noise: Standard deviation of each part of a measured orientation, in [rad] (or as a number, for
+            parts of a rotation matrix).
         walk: How fast joint zeros change, as a payload changes them: standard deviation after a second, in [rad/√s] or
             [m/√s].
         jump: Standard deviation of a sudden change of joint zeros, in [rad] or [m], that is assumed where poses are

@@ -33,16 +33,16 @@ class FixedPoint(CompiledPolicy):
     makes the step q + (A/2) Jᵀ (f(q) - x): the transposed Jacobian. Around a solution the error of q is multiplied by
     I + F'(ξ*) A JᵀJ (Khan 2020, eq. 2.6): it contracts for -2/σ_max² < F'(ξ*) A < 0, that is for
     |A| < 4/σ_max² in the paper, in all directions in which J has rank. In the others nothing moves, which is the
-    method's good behaviour at singularities, and why it leaves a path there that goes on along them.
+    method's good behaviour at singularities, and why it leaves a path there that continues along them.
 
     The iterations of a step use the model alone: a pose is never measured, so that a wrong model's error stays.
-    Where f - x is a rotation error (task ``pose``) it stands for f(q) - x. Position and orientation are weighed against
-    each other: h is Jᵀ W² (f(q) - x), and σ_max that of W J, with 1 in W for positions and a length ℓ for
+    Where f - x is a rotation error (task ``pose``) it takes the place of f(q) - x. Position and orientation are weighed
+    against each other: h is Jᵀ W² (f(q) - x), and σ_max that of W J, with 1 in W for positions and a length ℓ for
     orientations; the paper, where there are positions only, has none.
 
     Args:
         problem: The scenario as the policy knows it.
-        transformation: ``"transpose"``: h = Jᵀ (f(q) - x), as above. ``"none"``: h = f(q) - x, Dineva's own form
+        transformation: ``"transpose"``: h = Jᵀ (f(q) - x), as above. ``"none"``: h = f(q) - x, Dineva's form
             (Khan 2020, eq. 2.5), which converges where all eigenvalues of F'(ξ*) A J have negative real parts, as
             those of few arms do. ``"sign"``: h = σ (f(q) - x), σ = ±1 (Khan 2020, eq. 2.8; he had no success with it
             beyond 2 joints). The paper says only that σ depends on the direction of the previous step; it is read as
@@ -90,10 +90,10 @@ class FixedPoint(CompiledPolicy):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._settle(components=self._checked_components(), length=self._checked_length())
+        self._settle(components=self._check_components(), length=self._check_length())
         if self.slope == 0.0:
             raise InvalidInputError("slope: expected a number between -1 and 1 other than 0, got 0.")
-        factor = self._contracting() if self.a is None else self.a
+        factor = self._default_factor() if self.a is None else self.a
         if factor == 0.0:
             raise InvalidInputError("a: expected a number other than 0, got 0: nothing would move.")
         corrected_by = np.array(self.components or range(self.problem.model.joints))
@@ -113,7 +113,7 @@ class FixedPoint(CompiledPolicy):
             return FixedPointMemory(np.tile([1.0, np.inf], (rows, 1)))
         return FixedPointMemory(np.zeros((rows, self.problem.model.joints if self.transformation == "sign" else 0)))
 
-    def _checked_components(self) -> tuple[int, ...] | None:
+    def _check_components(self) -> tuple[int, ...] | None:
         size, joints = self.problem.task.error_size, self.problem.model.joints
         if self.components is None:
             if self.transformation != "transpose" and size != joints:
@@ -133,7 +133,7 @@ class FixedPoint(CompiledPolicy):
             )
         return given
 
-    def _checked_length(self) -> float | None:
+    def _check_length(self) -> float | None:
         if self.transformation == "transpose":
             return radian(self.problem.model) if self.length is None else self.length
         if self.length is not None:
@@ -149,7 +149,7 @@ class FixedPoint(CompiledPolicy):
         """A number that ‖W J‖² does not exceed, with prismatic joints at home."""
         return jacobian_bound(self.problem.model, self.problem.task, self._metres)
 
-    def _contracting(self) -> float:
+    def _default_factor(self) -> float:
         """The paper's A, or as much of it as is sure to contract with the transposed Jacobian."""
         papers = 1.0
         if self.transformation == "transpose":  # an arm without length has nothing but turns

@@ -14,7 +14,7 @@ class ModelFreeAdaptiveControl(DampedIteration):
 
     At each period the model is iterated from the present joint coordinates:
     ``Δq_(i) = Jᵀ (J Jᵀ + λ_(i) I)⁻¹ e(y*(k+1), F(q_(i-1)))`` until ‖e‖ ≤ δ, the error being that of the task: for
-    ``pose`` the rotation vector stands in for the printed arccos, which is 0/0 near 0. The printed (13) inverts
+    ``pose`` the rotation vector replaces the printed arccos, which is 0/0 near 0. The printed (13) inverts
     JᵀJ + λ I; the form in the small space is the same and does not need n² numbers where J is flat.
 
     Statuses: ``converged`` where the model meets δ; ``iteration_limit`` where it does not, as for a point out of

@@ -21,7 +21,7 @@ class ModelFreeAdaptivePredictiveControl(DampedIteration):
     :class:`mfac.ModelFreeAdaptiveControl`, and so is the first shift at λ = 0 (38) for any n.
 
     The test (40) asks that the whole predicted path meet its points. At λ = 0 the points behind the first are met
-    but to the second order of the motion per period, and with λ > 0 the first shift vanishes beside the point, where
+    to the second order of the motion per period, and with λ > 0 the first shift vanishes near the point, where
     the terms of the points ahead and of the first one cancel: on a moving trajectory the printed δ is out of reach and
     the status ``iteration_limit``. ``stop="first_point"`` asks it of the point that the arm is sent to only.
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from baselines.solvers.receding_horizon.newton.grid import evenly_growing_offsets
 from baselines.solvers.receding_horizon.rhc import RecedingHorizon
 
-# Each block of the plan is so many steps longer than the one before, up to a length.
+# By how many steps each block of the plan is longer than the previous one, and the longest.
 GROWTH, LONGEST = 2.0, 100.0
 # Values of parameters that are None: for arms without limits, and with limits.
 FREE = {"horizon": 3001, "iterations": 1, "starts": 23, "restart_steps": 20, "start_steps": 10}

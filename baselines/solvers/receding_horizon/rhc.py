@@ -20,7 +20,7 @@ import numpy.typing as npt
 from baselines.policy import Memory
 from baselines.policy.compiled import CompiledPolicy
 from baselines.policy.fields import derived
-from baselines.policy.surroundings import swept
+from baselines.policy.surroundings import sweep_bodies
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
@@ -44,13 +44,13 @@ class RecedingHorizon(CompiledPolicy):
     by one step, is the warm start of the next.
 
     To convergence (``iterations=None``) the plan is a local minimum of the horizon's cost, found with the exact Hessian
-    where that is positive definite; with a number of iterations it is so many Gauss–Newton steps away from the plan
-    before, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some
-    of them very costly: several ``starts`` and restart candidates are for that.
+    where that is positive definite; with a number of iterations it is that many Gauss–Newton steps away from the
+    previous plan, which at 1 kHz is close (the real-time iteration). A long horizon has many local minima, some of them
+    very costly: several ``starts`` and restart candidates are for that.
 
     The limits of the arm and the velocity limit of the scenario are constraints of the plan. Between blocks of a and b
     steps the velocity changes by at most q̈_max Δt (a + b) / 2, and from the last command by q̈_max Δt. Under limits the
-    plan before is moved by what the drives missed of that command, else the arm could not go on along it. Where
+    plan before is moved by what the drives missed of that command, else the arm could not continue along it. Where
     the horizon ends before the episode does, the last knot leaves the way that a stop takes, so that no plan runs into
     a joint limit that it does not see yet; with ``stop_at_end`` nothing comes behind the episode's end. Arms with
     limits of acceleration are planned for by an interior point method, see :mod:`newton.interior_point`: to
@@ -77,10 +77,10 @@ class RecedingHorizon(CompiledPolicy):
         restart_steps: Newton steps of a restart candidate: a second plan, which branches off at a random knot into a
             random guess, has one Newton step a control period, and replaces the plan when it is cheaper after its last
             step. 0 for none.
-        seed: Of the random guesses, which are the same in all episodes.
+        seed: Of the random guesses: all episodes have the same ones.
         start_steps: Newton steps of an initial guess in a period, where they are spread over the first periods: the
             first plan comes from the first guess, with its steps shared by the first two periods, and each of
-            ``starts`` - 1 periods after them goes on with another guess, as with a restart candidate, until it is
+            ``starts`` - 1 periods after them improves another guess, like a restart candidate, until it is
             cheaper than the plan or unpromising. A later candidate begins in a period without a Newton step of it, so
             that no period has both. 0 to try all guesses in the first period, which takes that much longer.
         recovery_steps: Newton steps in a period instead of ``iterations``, where the one before ended with joint
@@ -139,7 +139,7 @@ class RecedingHorizon(CompiledPolicy):
         given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
         settings = PlanSettings(**given)
         reals, integers = plain_settings(settings)
-        sweep = read_only(swept(model) if self.among_bodies else np.empty((0, model.joints)))
+        sweep = read_only(sweep_bodies(model) if self.among_bodies else np.empty((0, model.joints)))
         self._settle(offsets=knots, reals=reals, integers=integers, sweep=sweep)
 
     @property

@@ -62,7 +62,7 @@ def _path(scenario: Scenario, seed: int | None) -> PublishedPath:
 
 
 def _along(joints: FloatArray, scenario: Scenario, at: FloatArray) -> FloatArray:
-    """The joint path at waypoints and between them; joints without limits go on instead of jumping by full turns."""
+    """The joint path at waypoints and between them; joints without limits do not jump by full turns."""
     turning = np.isinf(scenario.arm.upper - scenario.arm.lower)
     joints = np.where(turning, np.unwrap(joints, axis=0), joints)
     numbers = np.arange(len(joints))

@@ -15,12 +15,12 @@ class TruncatedSVD(Pseudoinverse):
 
     The joint shift is at most ‖Δx‖ / (threshold σ_max). Within the directions that are kept nothing is distorted,
     unlike with damping; those left out are not tracked at all until their singular value has grown again, when the
-    accumulated error is taken back at once: the joint velocity jumps. Wherever one is left out the status says
+    accumulated error is corrected at once: the joint velocity jumps. Wherever one is left out the status says
     ``rank_deficient``.
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         threshold: Singular values of the task Jacobian below this share of the largest are left out. Between 0
             and 1.
 

@@ -23,11 +23,11 @@ class WeightedPseudoinverse(MoorePenrose):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         weights: w, above 0; only their ratios count. One number, or one a joint; between revolute and prismatic
             joints it holds a unit, [m²] per [rad²]. If left out, 1 / v² of the largest joint velocities v where the
-            model has velocity limits, so that each joint moves in terms of its own; equal ones where it has none.
+            model has velocity limits, so that motions count relative to them; equal ones where it has none.
 
     Raises:
         InvalidInputError: The gain, the tolerance or a weight is out of its range, or the weights are too few or

@@ -14,7 +14,7 @@ from ikgym.kernels.rotations import quaternion
 from ikgym.validation import FloatArray
 
 BASE, TIP = "base", "tool"
-#: Stands in a URDF for a limit that is none: readers take numbers beyond 1e20 as infinite.
+#: Written to a URDF for a limit that is none: readers take numbers beyond 1e20 as infinite.
 NO_LIMIT = 1e21
 
 
@@ -28,7 +28,7 @@ def urdf(arm: Arm, solids: Solids | None = None) -> str:
 
     Args:
         arm: The arm.
-        solids: Its bodies and the obstacles, each as a link of its own.
+        solids: Its bodies and the obstacles, each as a separate link.
     """
     n = arm.joints
     links = [f'<link name="{name}"/>' for name in (BASE, *(f"link{i}" for i in range(1, n + 1)), TIP)]
@@ -59,7 +59,7 @@ def _collisions(solids: Solids) -> Iterator[str]:
             "sphere": f'<sphere radius="{radius!r}"/>',
             "capsule": f'<cylinder radius="{radius!r}" length="{2.0 * float(half[2])!r}"/>',
         }.get(kind, f'<box size="{_text(2.0 * half)}"/>')
-        # This is how Pinocchio is told that a cylinder is a capsule.
+        # Pinocchio takes such a cylinder for a capsule.
         capsule = f'<collision_checking><capsule name="{name}"/></collision_checking>' if kind == "capsule" else ""
         yield (
             f'<link name="{name}">{capsule}<collision name="{name}"><geometry>{shape}</geometry></collision></link>'
@@ -118,7 +118,7 @@ def _geoms(solids: Solids, link: int) -> str:
 
 #: MuJoCo refuses bodies that move and have no mass; kinematics take no notice of it.
 _MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-#: Half of the edges in [m] of the box that stands for a half-space: more than any arm reaches.
+#: Half of the edges in [m] of the box in place of a half-space: more than any arm reaches.
 _WIDE = 10.0
 #: Farther than a joint goes, and less than MuJoCo's largest number.
 _FAR = 1e9

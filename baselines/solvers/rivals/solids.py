@@ -1,4 +1,4 @@
-"""Bodies and obstacles of a problem, for programs that have spheres, capsules, boxes and planes of their own."""
+"""Bodies and obstacles of a problem, as spheres, capsules, boxes and planes of other programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from baselines.policy import Problem
 from ikgym.obstacles.solids import on_links
 from ikgym.validation import FloatArray
 
-#: Stands for the link of obstacles.
+#: The link of obstacles.
 WORLD = -1
 
 

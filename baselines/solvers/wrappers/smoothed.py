@@ -41,7 +41,7 @@ class Smoothed(NamedWrapper):
     A constant velocity is followed 2/Λ late.
 
     The paper smooths the calculated q(t) afterwards, so that the calculation does not know of the smoothing: the inner
-    policy sees the arm where its own velocities would have brought the model, and runs as if it were alone. The effect
+    policy sees the arm where its velocities would have brought the model, and runs as if it were alone. The effect
     of a wrong model, disturbed drives or a saturated velocity on the pose is then seen by nobody, and stays. (Shown the
     arm as it is, the inner policy has the lag in its loop: a resolved rate of gain 1 and receding horizons diverge.)
 

@@ -5,7 +5,7 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.policy.surroundings import swept
+from baselines.policy.surroundings import sweep_bodies
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance, clearance_workspace
 from baselines.solvers.receding_horizon.newton.clearance import is_clear, keep_clear
@@ -25,7 +25,7 @@ BODIES = Bodies(("elbow", "hand"), (3, 7), [[0.0825, 0.0, 0.0], [0.0, 0.0, -0.1]
 def around(arm, obstacles):
     """The clearance of an arm from obstacles, as the kernels see it."""
     boxes, checked = arm.bodies.surroundings(obstacles)
-    return Clearance(arm.bodies.shapes, boxes[None], checked, swept(arm), MARGIN, MARGIN + INFLUENCE)
+    return Clearance(arm.bodies.shapes, boxes[None], checked, sweep_bodies(arm), MARGIN, MARGIN + INFLUENCE)
 
 
 def obstructed():
