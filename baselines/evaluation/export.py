@@ -1,27 +1,57 @@
-"""An episode as files: the trajectory log behind plots, joint motions as tables, and as messages for ROS 2."""
+"""The joint motion of an episode as files: a table, and a ROS 2 message in JSON or MCAP."""
 
 from __future__ import annotations
 
 import importlib.util
+import pathlib
+import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.motion.contacts import carried
-from baselines.evaluation.motion.message import joint_trajectory, mcap
-from baselines.evaluation.motion.played import Motion, by_joint
-from baselines.files import csv_text
+from baselines.evaluation.motion.spline import smooth, stop
+from baselines.files import csv_text, json_text
 from baselines.recording import Episode, Seeds
+from ikgym.arms import Arm
 from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
-#: Most pictures of a replay.
-FRAMES = 400
-#: Arrays by name, see :func:`trajectory_log`.
-TrajectoryLog = dict[str, npt.NDArray[Any]]
+KIND = "trajectory_msgs/msg/JointTrajectory"
+#: Topic of the message in an MCAP file.
+TOPIC = "/joint_trajectory_controller/joint_trajectory"
+#: Fields of a point with one number a joint.
+NUMBERS = ("positions", "velocities", "accelerations", "effort")
+
+
+class Motion(NamedTuple):
+    """The joint motion of an episode, from its start."""
+
+    times: FloatArray  # from 0, in [s]. Shape (steps + 1,)
+    q: FloatArray  # joint coordinates at these times, in [rad] or [m]. Shape (steps + 1, n)
+    # joint velocities of the step that ends then, 0 at the start, in [rad/s] or [m/s]. Shape (steps + 1, n)
+    qdot: FloatArray
+
+    @classmethod
+    def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
+        """The motion of an episode."""
+        q = np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q])
+        return cls(scenario.times(scenario.steps + 1), q, np.vstack([np.zeros(scenario.joints), episode.qdot]))
+
+    @property
+    def qddot(self) -> FloatArray:
+        """Change of the velocity in the step that ends then by Δt, in [rad/s²] or [m/s²]. Shape (steps + 1, n)."""
+        out: FloatArray = np.diff(self.qdot, axis=0, prepend=self.qdot[:1]) / (self.times[1] - self.times[0])
+        return out
+
+
+def by_joint(arm: Arm, values: FloatArray, per: str = "") -> dict[str, FloatArray]:
+    """Columns of a table by joint and unit, of values (k, n); `per` follows the unit of the joint, such as ``/s``."""
+    units = ["m" if prismatic else "rad" for prismatic in arm.prismatic]
+    heads = [f"{name} [{unit}{per}]" for name, unit in zip(arm.joint_names, units, strict=True)]
+    return dict(zip(heads, values.T, strict=True))
 
 
 def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
@@ -39,6 +69,68 @@ def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode, acceleratio
         **by_joint(scenario.arm, motion.qdot, "/s"),
     }
     return table(columns | (by_joint(scenario.arm, motion.qddot, "/s²") if accelerations else {}))
+
+
+def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> dict[str, Any]:
+    """The fields of the message; a time of 0 in the header means at once.
+
+    From rest at the start to rest at the end, see :func:`baselines.evaluation.motion.spline.stop`, with the velocities
+    of a cubic spline, see :func:`baselines.evaluation.motion.spline.smooth`. Controllers interpolate cubically between
+    points without accelerations, else by quintics.
+
+    Raises:
+        InvalidInputError: The episode ends in motion, and has no room to stop.
+    """
+    q = stop(scenario.arm, Motion.of(scenario, seeds, episode).q, scenario.dt)
+    points = smooth(q, scenario.dt)
+    times = scenario.dt * np.arange(len(points.q))
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(scenario.arm.joint_names),
+        "points": [
+            {
+                "positions": q,
+                "velocities": qdot,
+                "accelerations": qddot if accelerations else [],
+                "effort": [],
+                "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(1e9 * time), 10**9), strict=True)),
+            }
+            for time, q, qdot, qddot in zip(times.tolist(), *(array.tolist() for array in points), strict=True)
+        ],
+    }
+
+
+def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
+    """The message in JSON, which `ros2 topic pub` reads; see :func:`message`."""
+    return json_text(message(scenario, seeds, episode, accelerations)).encode()
+
+
+def mcap(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
+    """An MCAP file with the message, which `ros2 bag` and readers without ROS open; see :func:`message`."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    fields = message(scenario, seeds, episode, accelerations)
+    with tempfile.TemporaryDirectory() as folder:
+        bag = pathlib.Path(folder) / "motion"
+        with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection(TOPIC, KIND, typestore=store)
+            writer.write(connection, 0, store.serialize_cdr(_typed(store.types, fields), KIND))
+        (file,) = bag.glob("*.mcap")
+        return file.read_bytes()
+
+
+def _typed(types: Any, fields: dict[str, Any]) -> Any:
+    """The message as rosbags has it."""
+    duration, point = types["builtin_interfaces/msg/Duration"], types["trajectory_msgs/msg/JointTrajectoryPoint"]
+    stamp, header = types["builtin_interfaces/msg/Time"], types["std_msgs/msg/Header"]
+    points = [
+        point(**{key: np.array(one[key]) for key in NUMBERS}, time_from_start=duration(**one["time_from_start"]))
+        for one in fields["points"]
+    ]
+    head = header(stamp=stamp(**fields["header"]["stamp"]), frame_id=fields["header"]["frame_id"])
+    return types[KIND](header=head, joint_names=fields["joint_names"], points=points)
 
 
 class Format(NamedTuple):
@@ -68,77 +160,3 @@ def check_formats(names: Iterable[str]) -> None:
     for name in names:
         if (package := FORMATS[name].package) and importlib.util.find_spec(package) is None:
             raise MissingDependencyError(f'Format {name!r} needs {package}: pip install "ikgym[paths]"')
-
-
-def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> TrajectoryLog:
-    """The data of the plots of an episode, at the steps that count.
-
-    Args:
-        scenario: The scenario.
-        seeds: Seeds of the episode.
-        episode: Its record.
-
-    Returns:
-        ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
-        ``position_error`` and, where there is one, ``orientation_error`` (k,); ``joint_names``; ``prismatic``,
-        which joints are prismatic, and the limits ``lower``, ``upper`` and ``velocity_limit`` of the arm, infinite
-        where there is none, all of shape (n,). If there are limits of acceleration, ``acceleration_limit`` (n,), and
-        ``qddot`` (k, n): the change of q̇ in the step by Δt, from rest.
-        For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
-        (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
-        ``tool_rotation`` (f, 3, 3).
-        Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of
-        :func:`baselines.evaluation.motion.contacts.carried` for the replay.
-    """
-    after = np.flatnonzero(scenario.counted())
-    kept = after - 1
-    log: TrajectoryLog = {
-        "time": after * scenario.dt,
-        "nominal": scenario.nominal(seeds.seed)[after],
-        "pose": episode.pose[kept],
-        "q": episode.q[kept],
-        "qdot": episode.qdot[kept],
-        "position_error": episode.position_error[kept],
-        "joint_names": np.array(scenario.arm.joint_names),
-        "prismatic": np.array(scenario.arm.prismatic, dtype=np.bool_),
-        "lower": scenario.arm.lower,
-        "upper": scenario.arm.upper,
-        "velocity_limit": scenario.arm.velocity_limit,
-    }
-    if scenario.task.has_orientation:
-        log["orientation_error"] = episode.orientation_error[kept]
-    if np.isfinite(scenario.arm.acceleration_limit).any():
-        start = np.zeros((1, scenario.joints))
-        log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
-        log["acceleration_limit"] = scenario.arm.acceleration_limit
-    frames = frame_rows(len(kept), FRAMES)
-    log |= {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
-    if episode.clearance is None:
-        return log
-    return log | {"clearance": episode.clearance[kept]} | carried(scenario, seeds, log["q"][frames], after[frames])
-
-
-#: Arrays of every log.
-USUAL = (
-    *("time", "nominal", "pose", "q", "qdot", "position_error", "joint_names", "prismatic", "lower", "upper"),
-    *("velocity_limit", "frame", "joint_points", "tool", "tool_rotation"),
-)
-
-
-def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
-    """At most so many rows, evenly spread; the last one always."""
-    count = min(rows, most)
-    frames: npt.NDArray[np.int64] = -(-np.arange(1, count + 1) * rows // count) - 1
-    return frames
-
-
-def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
-    """Points of the arm that moves, which may differ from its data sheet, after numbers of steps."""
-    plant, n = scenario.drawn_plant(seeds.seed, seeds.arm_seed), scenario.joints
-    loaded = after >= plant.payload_step
-    points, tool, rotation = np.empty((len(q), n, 2, 3)), np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    for rows, arm in ((~loaded, plant.arm), (loaded, plant.loaded_arm)):
-        points[rows] = arm.joint_points(q[rows])
-        rotation[rows], tool[rows] = arm.forward(q[rows])
-    arrays = {"joint_points": points, "tool": tool, "tool_rotation": rotation}
-    return {name: array.astype(np.float32) for name, array in arrays.items()}

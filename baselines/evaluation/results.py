@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.canonical import canonical
-from baselines.evaluation.export import FORMATS, USUAL, Format, trajectory_log
+from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
+from baselines.evaluation.log import USUAL, trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.motion.free_timing import as_long
 from baselines.files import (

@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from baselines.evaluation.export import table, trajectory_log
+from baselines.evaluation.export import Motion, by_joint, joint_trajectory, mcap, table
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.jobs import job_of
+from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.motion.free_timing import as_long
-from baselines.evaluation.motion.message import joint_trajectory, mcap
-from baselines.evaluation.motion.played import Motion, by_joint
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy
 from baselines.evaluation.run import play

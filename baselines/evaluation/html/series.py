@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.evaluation.export import TrajectoryLog, frame_rows
+from baselines.evaluation.log import TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.exceptions import printable
 from ikgym.obstacles.solids import bounded, in_space, surface
@@ -27,7 +27,7 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
     """A log at some of its steps, such that no peak is lost: between two of them, the worst is shown.
 
     Args:
-        log: See :func:`baselines.evaluation.export.trajectory_log`.
+        log: See :func:`baselines.evaluation.log.trajectory_log`.
         size: Bytes that it may take as text.
 
     Returns:

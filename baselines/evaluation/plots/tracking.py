@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.evaluation.export import TrajectoryLog
+from baselines.evaluation.log import TrajectoryLog
 from baselines.evaluation.plots import style
 from ikgym.validation import FloatArray
 
@@ -19,7 +19,7 @@ HEIGHT = 1.75  # of a panel, in [in]
 
 
 def draw(title: str, log: TrajectoryLog) -> Figure:
-    """The plot of a log, see :func:`baselines.evaluation.export.trajectory_log`."""
+    """The plot of a log, see :func:`baselines.evaluation.log.trajectory_log`."""
     kinds = [kind for kind in ERRORS if kind in log]
     rows = len(kinds) + ("clearance" in log) + 1
     drawn = style.figure(0.7 + HEIGHT * rows)

@@ -12,8 +12,8 @@ import ikgym
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.html.series import BUDGET, thinned
+from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise

@@ -11,7 +11,7 @@ import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.motion.free_timing import reference_at
-from baselines.evaluation.motion.stop import FEWEST
+from baselines.evaluation.motion.spline import FEWEST
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import COLUMNS, summarise
 from baselines.evaluation.table import records

@@ -11,8 +11,8 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation.export import trajectory_log
 from baselines.evaluation.html.series import ACCELERATION, VELOCITY, limits
+from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, measure
 from baselines.evaluation.summary import summarise
 from baselines.files import from_json

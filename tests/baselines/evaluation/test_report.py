@@ -10,7 +10,7 @@ import ikgym
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report, run
-from baselines.evaluation.export import trajectory_log
+from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.plots import tracking
 from baselines.evaluation.summary import summarise

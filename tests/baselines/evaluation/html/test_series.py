@@ -6,8 +6,8 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollout
-from baselines.evaluation.export import FRAMES, frame_rows, trajectory_log
 from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thinned
+from baselines.evaluation.log import FRAMES, frame_rows, trajectory_log
 from baselines.recording import Seeds
 from tests.limited import limited
 

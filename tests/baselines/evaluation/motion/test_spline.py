@@ -7,8 +7,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import ikgym
-from baselines.evaluation.motion.spline import accelerations, smooth
-from baselines.evaluation.motion.stop import FEWEST, stopped
+from baselines.evaluation.motion.spline import FEWEST, accelerations, smooth, stop
 from ikgym.exceptions import InvalidInputError
 
 DT = 1e-3
@@ -86,7 +85,7 @@ def moving(speed, joint=0, sign=1.0):
 
 def test_a_motion_is_continued_to_rest_no_harder_than_it_began():
     q = moving(1.2)
-    out = stopped(PANDA, q, DT)
+    out = stop(PANDA, q, DT)
     np.testing.assert_array_equal(out[: len(q)], q)
     np.testing.assert_array_equal(out[-1], out[-2])
     changes = np.diff(out, 2, axis=0) / DT**2
@@ -94,8 +93,8 @@ def test_a_motion_is_continued_to_rest_no_harder_than_it_began():
     assert np.abs(changes[-1]).max() < 0.1
     points = smooth(out, DT)
     assert np.abs(points.qdot[-1]).max() == 0.0
-    np.testing.assert_array_equal(stopped(PANDA, out, DT), out)
-    assert len(stopped(PANDA, moving(1e-9), DT)) >= len(q) + FEWEST
+    np.testing.assert_array_equal(stop(PANDA, out, DT), out)
+    assert len(stop(PANDA, moving(1e-9), DT)) >= len(q) + FEWEST
 
 
 def test_a_motion_without_room_to_stop_is_refused_with_its_joint():
@@ -106,4 +105,4 @@ def test_a_motion_without_room_to_stop_is_refused_with_its_joint():
     q = moving(1.5, joint=3, sign=-1.0)
     q[:, 3] += PANDA.lower[3] + 0.05 - q[-1, 3]
     with pytest.raises(InvalidInputError, match=message):
-        stopped(PANDA, q, DT)
+        stop(PANDA, q, DT)
