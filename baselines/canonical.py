@@ -31,6 +31,6 @@ def jsonable(value: Any) -> Any:
     return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
 
 
-def rounded(value: float, digits: int) -> float:
-    """A number with so many significant digits."""
+def round_digits(value: float, digits: int) -> float:
+    """A number with some significant digits."""
     return float(f"{value:.{digits}g}")

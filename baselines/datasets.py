@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import gymnasium as gym
-import h5py  # noqa: F401  # Minari's own message does not say which extra installs it
+import h5py  # noqa: F401  # Minari's message does not say which extra installs it
 import minari
 import numpy as np
 from minari.data_collector import EpisodeBuffer
@@ -73,13 +73,13 @@ def write(
         spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
         storage = MinariStorage.new(draft.absolute(), env_spec=env.spec, **spaces)
 
-        def played() -> Iterator[EpisodeBuffer]:
+        def play() -> Iterator[EpisodeBuffer]:
             for job in tqdm(jobs, disable=not progress, file=sys.stderr, unit="episode", dynamic_ncols=True):
                 episode = _episode(env, job)
                 costs.append(_costs(episode))
                 yield episode
 
-        storage.update_episodes(played())
+        storage.update_episodes(play())
         storage.update_episode_metadata(costs)
         text = ",".join(f"{key}={value!r}" for key, value in first.parameters.items())
         storage.update_metadata(
@@ -126,7 +126,7 @@ def _environment(job: Job) -> gym.Env[Any, Any]:
 
 
 def _episode(env: gym.Env[Any, Any], job: Job) -> EpisodeBuffer:
-    """Plays an episode. Minari's own collector would need jax."""
+    """Plays an episode. Minari's collector would need jax."""
     policy, state, ended = job.bind(), None, False
     observations, infos = [env.reset(seed=job.seeds.seed)[0]], list[dict[str, Any]]()
     actions, rewards = list[Any](), list[float]()

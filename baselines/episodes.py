@@ -124,7 +124,7 @@ def rollouts(
         scenario: The scenario.
         policy: The policy.
         seeds: The reset seed of each episode, or all of its seeds.
-        preview: Steps ahead that the policy is shown; its own if left out.
+        preview: Steps ahead that the policy is shown; the policy's if left out.
         timed: Whether the calls are timed.
         tick: Reports progress, the steps of all episodes.
         in_a_row: Number of episodes that follow one another, so that the policy keeps its state: it can use in later

@@ -78,7 +78,7 @@ def csv_text(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:
 
 
 def read_bytes(file: pathlib.Path, most: int = LARGEST) -> bytes:
-    """The content of a file of at most so many bytes, see :func:`ikgym.files.read_user_file`.
+    """The content of a file of at most `most` bytes, see :func:`ikgym.files.read_user_file`.
 
     Raises:
         ResultsError: It cannot be read.
@@ -250,7 +250,7 @@ def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
     file, until = folder / LOCK, time.monotonic() + patience
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        while (number := _acquired(file)) is None:
+        while (number := _acquire(file)) is None:
             if time.monotonic() >= until:
                 holder = file.read_text(errors="replace") if file.exists() else ""
                 who = f"process {holder}" if holder.isdecimal() else "another process"
@@ -268,7 +268,7 @@ def locked(folder: pathlib.Path, patience: float = 0.0) -> Iterator[None]:
         os.close(number)
 
 
-def _acquired(file: pathlib.Path) -> int | None:
+def _acquire(file: pathlib.Path) -> int | None:
     """The descriptor of the locked file; None if another process holds the lock."""
     while True:
         number = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)

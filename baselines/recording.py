@@ -60,7 +60,7 @@ class Episode:
             collisions. Shape (steps,).
         pair: The closest pair, and the one that touched where the arm stops, see
             :meth:`ikgym.Scenario.pair_names`; -1 where nothing can meet. Shape (steps, 2).
-        stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (steps,).
+        stopped: 1 where bodies have touched and the arm has stopped, 0 elsewhere. Shape (steps,).
         proximity_cost: Φ^C, 0 where the step does not count; None where the scenario has no such cost. Shape (steps,).
     """
 

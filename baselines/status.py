@@ -17,7 +17,7 @@ class Status(enum.IntEnum):
     #: Nothing is said: the policy is no solver of this package, such as a model of Stable-Baselines3.
     UNKNOWN = -1
 
-    #: The solver's own test was passed: its residual is within a tolerance.
+    #: The solver's test was passed: its residual is within a tolerance.
     CONVERGED = 0
     #: A formula was applied, a network evaluated or a path played, in one pass: nothing is said about convergence.
     APPLIED = 1

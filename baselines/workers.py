@@ -117,12 +117,12 @@ def finished(
     with started() as call, contextlib.ExitStack() as stack:
         threads = ThreadPoolExecutor(max(1, min(number, len(units))), thread_name_prefix="worker")
         stack.callback(threads.shutdown, wait=False, cancel_futures=True)
-        pending = {threads.submit(_retried, call, function, unit, tries): unit for unit in units}
+        pending = {threads.submit(_retry, call, function, unit, tries): unit for unit in units}
         for future in as_completed(pending):
             yield pending.pop(future), future
 
 
-def _retried(call: Call, function: Callable[[Unit], Result], unit: Unit, tries: int) -> Result:
+def _retry(call: Call, function: Callable[[Unit], Result], unit: Unit, tries: int) -> Result:
     attempt = 1
     while True:
         try:
@@ -140,16 +140,16 @@ def _processes() -> Iterator[Call]:
     # Spawned, not forked: a fork would inherit numba's and the BLAS's threads without the owners of their locks.
     context = multiprocessing.get_context("spawn")
     reader, writer = context.Pipe(duplex=False)  # closed, by whatever ends this process, it ends the workers
-    own, pools = threading.local(), list[ProcessPoolExecutor]()
+    local, pools = threading.local(), list[ProcessPoolExecutor]()
 
     def call(function: Callable[[Any], Any], unit: Any) -> Any:
-        if not hasattr(own, "pool"):
-            own.pool = ProcessPoolExecutor(1, context, _end_with, (reader,))
-            pools.append(own.pool)
+        if not hasattr(local, "pool"):
+            local.pool = ProcessPoolExecutor(1, context, _end_with, (reader,))
+            pools.append(local.pool)
         try:
-            return own.pool.submit(function, unit).result()
+            return local.pool.submit(function, unit).result()
         except BrokenProcessPool:
-            del own.pool
+            del local.pool
             if writer.closed:
                 raise
             raise LostError("its process died") from None
@@ -211,7 +211,7 @@ def _tasks() -> Iterator[Call]:
 
 
 def _on_one_core(function: Callable[[Any], Any], unit: Any) -> tuple[Any, Exception | None]:
-    """Result and error of a unit: Ray replaces exceptions by its own."""
+    """Result and error of a unit: Ray would replace the exception."""
     threads.limit_cores(1)
     try:
         return function(unit), None

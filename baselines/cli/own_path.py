@@ -1,4 +1,4 @@
-"""An arm and a path of the user's own, as options that several commands have."""
+"""An arm and a path of the user, as options that several commands have."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class RobotOptions(Frozen):
     def robot(self, name: str) -> Arm:
         """The arm of a URDF file, or of the catalogue by its name."""
         if not name.endswith(".urdf"):
-            return self.accelerated(arms.get(name))
-        return self.accelerated(
+            return self.with_acceleration(arms.get(name))
+        return self.with_acceleration(
             arms.from_urdf(
                 name,
                 base=self.base,
@@ -56,7 +56,7 @@ class RobotOptions(Frozen):
             )
         )
 
-    def accelerated(self, arm: Arm) -> Arm:
+    def with_acceleration(self, arm: Arm) -> Arm:
         """The arm with the acceleration limits that are given; the same where none are."""
         if not self.acceleration:
             return arm
@@ -126,13 +126,13 @@ def scenario_of(options: OwnPath) -> Scenario:
     scenario = scenarios.find(options.file)
     changes: dict[str, Any] = {} if options.dt is None else {"dt": options.dt}
     if options.acceleration:
-        changes["arm"] = options.accelerated(scenario.arm)
+        changes["arm"] = options.with_acceleration(scenario.arm)
     return scenario.replace(**changes) if changes else scenario
 
 
 def _from_csv(options: OwnPath) -> Scenario:
     if options.arm is None:
-        raise InvalidInputError(f"--arm: expected the name of an arm or FILE.urdf beside {options.file}, got none.")
+        raise InvalidInputError(f"--arm: expected the name of an arm or FILE.urdf with {options.file}, got none.")
     arm, speed = options.robot(options.arm), options.speed
     law: dict[str, Any] = {}
     if speed is not None:

@@ -57,7 +57,7 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
         UnknownNameError: A rule looks at a scenario that does not exist.
         SystemExit: With 0 after ``--help``.
     """
-    given = _given(arguments)
+    given = _read_spellings(arguments)
     find_own_modules()
     said = io.StringIO()
     try:
@@ -113,7 +113,7 @@ def find_own_modules() -> None:
         sys.path.append(here)
 
 
-def _given(arguments: Sequence[str]) -> dict[str, str]:
+def _read_spellings(arguments: Sequence[str]) -> dict[str, str]:
     """The options as they are spelt in the help, and as they were given."""
     out: dict[str, str] = {}
     last = "the command"

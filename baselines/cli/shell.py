@@ -200,7 +200,7 @@ class Names:
 N = TypeVar("N", bound=Names)
 
 
-def listed(
+def list_command(
     word: str,
     kind: str,
     names: Callable[[], Sequence[str]],
@@ -232,12 +232,12 @@ def listed(
         if given.names:
             print("\n\n".join(full(name, given) for name in given.names))
         else:
-            print(aligned([(kind, *row[0]), *((name, *row[1](name)) for name in known)], width()))
+            print(align([(kind, *row[0]), *((name, *row[1](name)) for name in known)], width()))
 
     return Command(word, options, lambda _: f"Lists the {word}, or shows some in full.", work, rules)
 
 
-def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
+def align(rows: Sequence[Sequence[str]], most: int) -> str:
     """A table of rows of cells, the head first, that fits the width in characters; the last column fills the line.
 
     Where that leaves too little to the last column, the widest of the others are wrapped, too, names at underscores.
@@ -248,7 +248,7 @@ def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
     last = max(most - sum(sizes) - 2 * len(sizes), LAST)
     lines: list[list[str]] = []
     for row in rows:
-        cells = [_wrapped(cell, size) for cell, size in zip(row, (*sizes, last), strict=True)]
+        cells = [_wrap(cell, size) for cell, size in zip(row, (*sizes, last), strict=True)]
         lines.append([])
         for parts in itertools.zip_longest(*cells, fillvalue=""):
             lines[-1].append(
@@ -259,7 +259,7 @@ def aligned(rows: Sequence[Sequence[str]], most: int) -> str:
     return "\n".join([*head, "-" * min(longest, most), *(line for one in others for line in one)])
 
 
-def _wrapped(cell: str, size: int) -> list[str]:
+def _wrap(cell: str, size: int) -> list[str]:
     wrapper = textwrap.TextWrapper(size, break_on_hyphens=False)
     if len(max(cell.split(), key=len, default="")) > size:
         wrapper.wordsep_simple_re = re.compile(r"(\s+|(?<=_))")

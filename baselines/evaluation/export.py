@@ -116,12 +116,12 @@ def mcap(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool
         bag = pathlib.Path(folder) / "motion"
         with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             connection = writer.add_connection(TOPIC, KIND, typestore=store)
-            writer.write(connection, 0, store.serialize_cdr(_typed(store.types, fields), KIND))
+            writer.write(connection, 0, store.serialize_cdr(_to_rosbags(store.types, fields), KIND))
         (file,) = bag.glob("*.mcap")
         return file.read_bytes()
 
 
-def _typed(types: Any, fields: dict[str, Any]) -> Any:
+def _to_rosbags(types: Any, fields: dict[str, Any]) -> Any:
     """The message as rosbags has it."""
     duration, point = types["builtin_interfaces/msg/Duration"], types["trajectory_msgs/msg/JointTrajectoryPoint"]
     stamp, header = types["builtin_interfaces/msg/Time"], types["std_msgs/msg/Header"]

@@ -60,10 +60,10 @@ class Options(Frozen):
     split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "test"
     """Seeds of random scenarios: train, validation or test."""
     steps: Annotated[int | None, tyro.conf.arg(metavar="N"), Bounds(at_least=1)] = None
-    """Most steps of an episode, for trials. The scenario's own number if left out."""
+    """Most steps of an episode, for trials. The number of the scenario if left out."""
     preview: Annotated[Preview | None, tyro.conf.arg(metavar="P …")] = None
     """Number of steps ahead that policies are shown, or several numbers for just those steps, such as 1 10 40. The
-    policy's own preview if left out."""
+    policy's preview if left out."""
     wrap: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = None
     """Wraps the environment for policies that are no :class:`baselines.SolverPolicy`, as an agent needs it that was
     trained in a wrapped one: ``wrap(env) -> env``. Costs and errors are those of the environment inside."""
@@ -143,9 +143,9 @@ class Job:
         return self.specification.name
 
     @property
-    def given(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, Any]:
         """The parameters of the policy's constructor for this episode."""
-        return self.specification.given(self.scenario, self.seeds)
+        return self.specification.arguments(self.scenario, self.seeds)
 
     @property
     def fingerprint(self) -> str:

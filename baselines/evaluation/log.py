@@ -42,7 +42,7 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
-        Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of :func:`_carried`.
+        Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of :func:`_place_solids`.
     """
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
@@ -69,7 +69,9 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
     log |= {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
     if episode.clearance is None:
         return log
-    return log | {"clearance": episode.clearance[kept]} | _carried(scenario, seeds, log["q"][frames], after[frames])
+    return (
+        log | {"clearance": episode.clearance[kept]} | _place_solids(scenario, seeds, log["q"][frames], after[frames])
+    )
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
@@ -91,7 +93,7 @@ def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.ND
     return {name: array.astype(np.float32) for name, array in arrays.items()}
 
 
-def _carried(
+def _place_solids(
     scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]
 ) -> dict[str, npt.NDArray[Any]]:
     """Solids in the frames that carry them, and the closest points; see :mod:`ikgym.obstacles.solids`.
@@ -116,12 +118,12 @@ def _carried(
         frames[rows] = link_frames(arm, q[rows])
         points[rows] = closest(arm, q[rows], boxes[rows], scenario.surroundings.checked).points
     moving = [number for number, one in enumerate(obstacles) if one.motion is not None]
-    solids, own = boxes[0].copy(), np.full(len(boxes[0]), scenario.joints + 1)
-    solids[moving, :12], own[moving] = AT_REST, scenario.joints + 2 + np.arange(len(moving))
+    solids, carriers = boxes[0].copy(), np.full(len(boxes[0]), scenario.joints + 1)
+    solids[moving, :12], carriers[moving] = AT_REST, scenario.joints + 2 + np.arange(len(moving))
     still = np.tile(AT_REST, (len(q), 1, 1))
     return {
         "solids": np.vstack([on_links(bodies), solids]),
-        "carriers": np.concatenate([np.array(bodies.links, dtype=np.int64), own]),
+        "carriers": np.concatenate([np.array(bodies.links, dtype=np.int64), carriers]),
         "carrier_frames": np.concatenate([frames, still, boxes[:, moving, :12]], axis=1).astype(np.float32),
         "closest": points.astype(np.float32),
     }

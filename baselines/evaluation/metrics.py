@@ -47,7 +47,7 @@ class Row:
     Args:
         scenario: Its name.
         policy: Its name.
-        parameters: All parameters of the policy, but for the seed of a reference.
+        parameters: All parameters of the policy, except the seed of a reference.
         seed: The reset seed.
         steps: Steps of the episode.
         total_cost: Sum of −reward, added up step by step.
@@ -67,13 +67,13 @@ class Row:
         steps_at_acceleration_limit: Steps with a joint at its acceleration limit.
         joint_limit_margin_min: Smallest distance of a joint from a limit of its coordinate, in [rad] or [m]; None where
             the arm has no such limit.
-        followed: Whether the path was followed, see :func:`followed`.
+        followed: Whether the path was followed, see :func:`is_followed`.
         solver_status: The worst status that the solver reported; unknown for policies that report none. It does not
             say whether the path was followed.
         time_p50_us: Median wall time of a call of the policy, in [µs], over all but the first, if there is another one.
             None, like all times, where the episode was played together with others.
         time_p99_us: Its 99th percentile, in [µs].
-        deadline_misses: Calls, but for the first, that took longer than the scenario's Δt.
+        deadline_misses: Calls after the first that took longer than the scenario's Δt.
         machine: Processor and versions, see :func:`describe`.
         iterations: Mean iterations of the policy in one step; None where they are not known.
         status_counts: Number of steps that ended with each status.
@@ -83,7 +83,7 @@ class Row:
         test_set: Digest of the test set of the episode, see :mod:`baselines.evaluation.test_sets`; None without one.
         arm_seed: Seed of the arm; None if the reset seed sets it.
         noise_seed: Seed of the noise in sensors and drives; 0 is the noise of the reset seed.
-        ideal: Fingerprint of the scenario with an ideal plant; its own if the plant is ideal.
+        ideal: Fingerprint of the scenario with an ideal plant; that of the scenario if the plant is ideal.
         acceleration_stated: Whether each joint has an acceleration limit, or the arm has no limits at all.
         path_time: With free timing, the time in [s] in which the end of the path was reached; None if it was not.
         path_position_error: With free timing, the largest distance from the reference at the policy's own progress, in
@@ -201,7 +201,7 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
     return not _within(LOST_POSITION, LOST_ORIENTATION, position_error, orientation_error)
 
 
-def followed(position_error: float, orientation_error: float | None) -> bool:
+def is_followed(position_error: float, orientation_error: float | None) -> bool:
     """Whether a path was followed, within 1 mm and 1 mrad; the arguments are those of :func:`lost`."""
     return _within(FOLLOWED_POSITION, FOLLOWED_ORIENTATION, position_error, orientation_error)
 
@@ -264,7 +264,7 @@ def measure(
         steps_at_velocity_limit=int(at.velocity.any(axis=1).sum()),
         steps_at_acceleration_limit=int(at.acceleration.any(axis=1).sum()),
         joint_limit_margin_min=_margin(scenario.arm, episode.q),
-        followed=followed(position_error, orientation_error),
+        followed=is_followed(position_error, orientation_error),
         solver_status=worst.label,
         time_p50_us=float(np.percentile(later, 50)) / 1e3 if timed else None,
         time_p99_us=float(np.percentile(later, 99)) / 1e3 if timed else None,

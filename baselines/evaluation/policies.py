@@ -70,13 +70,13 @@ class Specification:
         """Whether name and parameters identify the policy: two objects of one class may differ."""
         return bool(self.missing) or isinstance(self.model, (str, type, SolverPolicy))
 
-    def given(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
+    def arguments(self, scenario: Scenario, seeds: Seeds) -> dict[str, Any]:
         """The parameters of a solver for one episode: the user's, and the seeds that a reference needs to know it."""
         return {**self._seeds(scenario, seeds), **self.chosen} if self.solver else {}
 
     def per_episode(self, scenario: Scenario) -> bool:
         """Whether each episode needs a new policy, as with references that have privileged information."""
-        return self.given(scenario, Seeds(0)) != self.given(scenario, Seeds(1))
+        return self.arguments(scenario, Seeds(0)) != self.arguments(scenario, Seeds(1))
 
     def bind(self, scenario: Scenario, seeds: Seeds, preview: Preview | None = None) -> Policy:
         """The policy for an episode of a scenario; a foreign one is shown the preview, or what it states if None.
@@ -117,7 +117,7 @@ class Specification:
     def _bind_solver(self, solver: type[SolverPolicy], scenario: Scenario, seeds: Seeds) -> SolverPolicy:
         """A refused parameter is an error of the user's, unless the policy would not suit the scenario without it."""
         try:
-            return solver.for_scenario(scenario, **self.given(scenario, seeds))
+            return solver.for_scenario(scenario, **self.arguments(scenario, seeds))
         except (InvalidInputError, MissingDependencyError):
             decisive = {name: self.chosen[name] for name in solver.decisive if name in self.chosen}
             try:
@@ -172,7 +172,7 @@ def specifications(policies: Any, *, wrap: Wrap | None = None) -> list[Specifica
     out: list[Specification] = []
     for item in {id(one): one for one in ((policies,) if _is_single(policies) else policies)}.values():
         if isinstance(item, str) and item == ALL:
-            out.extend(map(_registered, registry.names()))
+            out.extend(map(_from_registry, registry.names()))
             continue
         found = specification(item, wrap=wrap)
         if _is_object(item) and found.foreign:
@@ -250,7 +250,7 @@ def _of_class(kind: type[Any], parameters: Mapping[str, Any], wrap: Wrap | None)
     return Specification(registry.import_path_of(kind), kind, dict(parameters), wrap)
 
 
-def _registered(name: str) -> Specification:
+def _from_registry(name: str) -> Specification:
     """One of all registered policies; one that cannot be imported is no reason to leave the others out."""
     try:
         return Specification(name, registry.get(name))

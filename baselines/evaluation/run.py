@@ -173,7 +173,7 @@ def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     """Jobs that are played together, in their order: timed ones and those of a policy for one episode alone."""
 
     def alike(job: Job) -> tuple[object, ...]:
-        return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.given)), job.timed
+        return job.scenario.name, job.policy, canonical(job.parameters), canonical(jsonable(job.arguments)), job.timed
 
     out: list[Batch] = []
     for _, group in itertools.groupby(jobs, alike):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # slow to import, and not needed for numbers and names
 
 #: The text of a cell without a value, and its value for sorting.
 NOTHING, LAST = "–", 1e300
-#: Longest name of a policy in a line of a plain table; longer ones have a line of their own.
+#: Longest name of a policy in a line of a plain table; longer ones have a separate line.
 LONGEST = 20
 #: Suffixes of columns and the units in the heads.
 UNITS = {
@@ -108,7 +108,7 @@ def plain(chosen: Sequence[Column], lines: pd.DataFrame, width: int) -> tuple[st
             for column, text in zip(kept, line, strict=True)
             for blank in [" " * (sizes[column.key] - _width(text))]
         ]
-        if _width(line[0]) > LONGEST:  # a long name has a line of its own
+        if _width(line[0]) > LONGEST:  # a long name has a separate line
             padded[0] = f"{line[0]}\n{' ' * sizes[kept[0].key]}"
         rows.append((" " * gap).join(padded).rstrip())
     heads = rows[: 1 + any(column.unit for column in kept)]
@@ -199,7 +199,7 @@ def _cell(line: Mapping[Any, Any], name: str) -> str:
         return code(str(value)).replace("|", "\\|")
     found = _number(value)
     if found is None:
-        return escaped(str(value))
+        return escape_markdown(str(value))
     if found.is_integer() and "." not in str(value):
         return f"{found:,.0f}"
     if name.endswith("_percent"):
@@ -215,7 +215,7 @@ def _number(cell: Any) -> float | None:
         return None
 
 
-def escaped(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """A text that Markdown, and MDX, shows letter by letter in one line; tags and expressions in it do not run."""
     return re.sub(r"[\\`*{}\[\]<>&#|~!$]|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", " ".join(text.split()))
 

@@ -24,7 +24,7 @@ class TestSet:
     split: str = "test"  # the split of the seeds, see :data:`ikgym.scenarios.SPLITS`
     noise_seeds: int = 1  # repetitions of each episode with other noise in sensors and drives
     # episodes that one arm plays in a row: seed s has the arm seed s // sequence, and the policy keeps its state.
-    # 1 if every episode has its own arm
+    # 1 if every episode has another arm
     sequence: int = 1
 
     @property
@@ -50,11 +50,11 @@ SETS = {
         TestSet("varga7-pose-random-long", episodes=32, digest="fe2dfbb641c8"),
         TestSet("varga7-random", episodes=64, digest="f18d6765c034"),
         TestSet("varga7-random-long", episodes=16, digest="f6956633fa43"),
-        # Fewer episodes than in the first set: each needs a search of its own for its best known cost.
+        # Fewer episodes than in the first set: each needs a search for its best known cost.
         TestSet("panda-random", episodes=128, digest="f4492864d6be"),
         TestSet("iiwa14-random", episodes=128, digest="4b2efa43deaa"),
         # Imperfect plants. Three noise seeds of 64 episodes are 576,000 steps, and every episode needs a best known
-        # cost on an arm of its own.
+        # cost on its arm.
         TestSet("panda-ideal", episodes=64, digest="48bde4a871be"),
         TestSet("panda-measured", episodes=64, digest="c6fd6151ddef"),
         TestSet("panda-camera", episodes=64, digest="fef44af732ba", noise_seeds=3),

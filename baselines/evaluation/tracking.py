@@ -145,8 +145,8 @@ def track(
         scenario: The scenario, as :func:`ikgym.scenarios.find` takes it.
         policy: The policy, as :func:`baselines.evaluate.evaluate` takes it.
         seed: The reset seed.
-        preview: Steps ahead that the policy is shown, or which ones; its own if left out.
-        steps: Most steps; the scenario's own if left out.
+        preview: Steps ahead that the policy is shown, or which ones; the policy's if left out.
+        steps: Most steps; all of the scenario if left out.
         wrap: Wraps the environment for a policy that is no :class:`baselines.SolverPolicy`.
 
     Raises:

@@ -21,7 +21,7 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import Trial
 
 from baselines import registry
-from baselines.canonical import DIGITS, rounded
+from baselines.canonical import DIGITS, round_digits
 from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
@@ -95,7 +95,7 @@ def suggest(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any])
         elif isinstance(kind, IntDistribution):
             value = trial.suggest_int(name, kind.low, kind.high, log=kind.log)
         else:
-            value = rounded(trial.suggest_float(name, kind.low, kind.high, log=kind.log), DIGITS)
+            value = round_digits(trial.suggest_float(name, kind.low, kind.high, log=kind.log), DIGITS)
         out |= nest(name, value, {**given, **out})
     return out
 

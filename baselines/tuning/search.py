@@ -17,7 +17,7 @@ from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.trial import Trial, TrialState
 
 from baselines import registry
-from baselines.canonical import DIGITS, canonical, rounded
+from baselines.canonical import DIGITS, canonical, round_digits
 from baselines.episodes import rollouts
 from baselines.files import check_flags, check_same, read_bytes, reading
 from baselines.fingerprints import fingerprint
@@ -212,7 +212,7 @@ def _best(study: optuna.Study, search: Search) -> dict[str, Any]:
         (one.value, one.user_attrs["settings"]) for one in trials if one.state is TrialState.COMPLETE and one.value
     ]
     cost, settings = min([(default, {}), *complete], key=operator.itemgetter(0))
-    digits = {"default": rounded(default, DIGITS), "tuned": rounded(cost, DIGITS)}
+    digits = {"default": round_digits(default, DIGITS), "tuned": round_digits(cost, DIGITS)}
     return {"spec": search.spec, "settings": settings, "tried": len(trials) + 1, **digits}
 
 

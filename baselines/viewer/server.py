@@ -19,7 +19,7 @@ import viser
 import websockets.asyncio.server
 from viser.transforms import SO3
 
-from baselines.evaluation.table import escaped
+from baselines.evaluation.table import escape_markdown
 from baselines.viewer.drawing import Drawing
 from baselines.viewer.meshes import Shape
 from baselines.viewer.readings import slider_range
@@ -53,7 +53,7 @@ class Viewer:
         self.drawing = Drawing(server, session, shapes)
         self.drawing.target.on_update(self._dragged)
         server.on_client_connect(lambda client: self.drawing.look(client.camera))
-        gui.add_markdown(f"**{escaped(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
+        gui.add_markdown(f"**{escape_markdown(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
         if session.has_bodies:
             self.bodies = gui.add_checkbox("bodies and obstacles", stage.scenario.collides)
             self._on_user([self.bodies], self.drawing.show_bodies)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.evaluation.table import escaped
+from baselines.evaluation.table import escape_markdown
 from baselines.status import Status
 from baselines.viewer.following import Approach, follower
 from baselines.viewer.readings import Reader, Reading
@@ -156,8 +156,8 @@ class Session:
     def _readings(self, shown: Shown) -> str:
         """A heading and a list."""
         scenario, reading, scene = self.stage.scenario, shown.reading, shown.scene
-        status = "" if shown.status == Status.UNKNOWN.label else f": {escaped(shown.status)}"
-        lines = [f"**{escaped(shown.policy)}**{status}\n"]
+        status = "" if shown.status == Status.UNKNOWN.label else f": {escape_markdown(shown.status)}"
+        lines = [f"**{escape_markdown(shown.policy)}**{status}\n"]
         errors = [(shown.position_error, "mm"), (shown.orientation_error, "mrad")]
         if texts := [f"{1e3 * error:.3g} {unit}" for error, unit in errors if np.isfinite(error)]:
             lines.append(f"- error {', '.join(texts)}")
@@ -165,10 +165,10 @@ class Session:
         joint = int(np.argmin(reading.margins))
         if np.isfinite(reading.margins[joint]):
             margin = f"{reading.margins[joint]:.3g} {'m' if scenario.arm.prismatic[joint] else 'rad'}"
-            lines.append(f"- {escaped(scenario.arm.joint_names[joint])} is {margin} from its limit")
+            lines.append(f"- {escape_markdown(scenario.arm.joint_names[joint])} is {margin} from its limit")
         if np.isfinite(scene.clearance):
             pair = scenario.pair_names(scene.closest.pairs[0].tolist())
-            lines.append(f"- {1e3 * scene.clearance:.1f} mm between {' and '.join(map(escaped, pair))}")
+            lines.append(f"- {1e3 * scene.clearance:.1f} mm between {' and '.join(map(escape_markdown, pair))}")
         if np.isfinite(shown.cost):
             lines.append(f"- cost so far {shown.cost:.4g}")
         return "\n".join(lines)

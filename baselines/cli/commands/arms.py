@@ -44,7 +44,7 @@ def kinds_of_limits(arm: Arm) -> list[str]:
     return [kind for kind, values in kinds.items() if np.isfinite(values).any()]
 
 
-def _shown(name: str, given: Arguments) -> str:
+def _show(name: str, given: Arguments) -> str:
     """An arm in full: of the catalogue, of a scenario file, or of a URDF file."""
     if name.endswith(".toml"):
         return _table(name, scenarios.find(name).arm)
@@ -73,7 +73,7 @@ def _choice(name: str, found: Sequence[Tip]) -> str:
         if found[0].fault
         else f"{name}: {len(found)} links can be the tip; choose one with --tip, such as --tip {found[0].link}"
     )
-    table = shell.aligned(rows, shell.width())
+    table = shell.align(rows, shell.width())
     return "\n".join([title, "", table, *([shell.listing("others", others)] if others else [])])
 
 
@@ -99,27 +99,27 @@ def _table(name: str, arm: Arm) -> str:
     tool = f"tool at ({shell.numbers(position)}) m, {x}, {z}, where q = 0"
     home = "none stated" if arm.home is None else f"({shell.numbers(arm.home)}) rad or m"
     title = f"{name}: {arm.joints} joints, {tool}, home posture {home}"
-    return "\n\n".join([textwrap.fill(title, shell.width()), shell.aligned(rows, shell.width()), *_bodies(arm)])
+    return "\n\n".join([textwrap.fill(title, shell.width()), shell.align(rows, shell.width()), *_bodies(arm)])
 
 
 def _bodies(arm: Arm) -> list[str]:
     """The bodies of an arm, with the meshes of its file, a line for each link; nothing if there are none."""
     arm = look_at(arm)
     bodies, links = arm.bodies, ("the base", *arm.joint_names)
-    told = textwrap.fill(f"Bodies: {describe_bodies(arm)}", shell.width(), break_on_hyphens=False)
+    text = textwrap.fill(f"Bodies: {describe_bodies(arm)}", shell.width(), break_on_hyphens=False)
     if not len(bodies):
-        return [told] if bodies.unseen else []
+        return [text] if bodies.unseen else []
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     kinds = [f"capsule of {length:.3g} m" if length else "sphere" for length in lengths]
     texts = [
         f"{name} ({kind}, radius {r:.3g} m)" for name, kind, r in zip(bodies.names, kinds, bodies.radii, strict=True)
     ]
     rows = [
-        (links[link], ", ".join(text for text, own in zip(texts, bodies.links, strict=True) if own == link))
+        (links[link], ", ".join(text for text, place in zip(texts, bodies.links, strict=True) if place == link))
         for link in sorted(set(bodies.links))
     ]
-    table = shell.aligned([("moved by", f"bodies; {len(bodies.pairs)} pairs of them can meet"), *rows], shell.width())
-    return [table, told]
+    table = shell.align([("moved by", f"bodies; {len(bodies.pairs)} pairs of them can meet"), *rows], shell.width())
+    return [table, text]
 
 
 def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> str:
@@ -132,12 +132,12 @@ def _scenario_table(name: str, tip: str | None, given: Arguments, arm: Arm) -> s
     return f"{head}\n\n{document({'arm': table}).strip()}"
 
 
-main = shell.listed(
+main = shell.list_command(
     "arms",
     "arm",
     arms.names,
     (("joints", "prismatic", "limits"), _arm_row),
-    _shown,
+    _show,
     endings=(".urdf", ".toml"),
     options=Arguments,
     rules=RULES,

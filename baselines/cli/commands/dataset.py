@@ -28,7 +28,7 @@ class Options(Frozen):
     split: Annotated[str, tyro.conf.arg(metavar="NAME")] = "train"
     """Seeds of random scenarios: train, validation or test. Scores of agents that learn from test are void."""
     preview: Annotated[int | None, tyro.conf.arg(metavar="P")] = None
-    """Steps ahead that the policy is shown; its own preview if left out."""
+    """Steps ahead that the policy is shown; its preview if left out."""
     overwrite: bool = False
     """Replace the data set in the folder."""
 

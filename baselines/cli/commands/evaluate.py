@@ -34,21 +34,21 @@ class Arguments(Options):
     varga7-fast."""
     policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
     """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
-    one of your own, also of a module in the current folder, or: all."""
+    a class of yours, also of a module in the current folder, or: all."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.scenarios or self.test_sets):
             object.__setattr__(self, "scenarios", ("varga7-fast",))
 
-    def played(self) -> list[Scenario]:
+    def all_scenarios(self) -> list[Scenario]:
         """The scenarios, those of test sets included."""
         names = scenarios.names() if "all" in self.scenarios else self.scenarios
         return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in self.test_sets)]
 
 
 def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
-    return lambda given: any(map(test, given.played()))
+    return lambda given: any(map(test, given.all_scenarios()))
 
 
 #: Processes of this machine, or a cluster.
@@ -138,7 +138,7 @@ def _show(lines: pd.DataFrame, skipped: Sequence[Skipped]) -> None:
 
 
 def _work(given: Arguments, command: str) -> None:
-    for warning in cut_off(given.played()) if given.steps is None else ():
+    for warning in cut_off(given.all_scenarios()) if given.steps is None else ():
         print(warning, file=sys.stderr)
     carry_out(dataclasses.replace(given, progress=True), command=command, show=_show)
     if given.out is not None:

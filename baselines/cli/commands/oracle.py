@@ -78,7 +78,7 @@ Examples:
   {prog} --scenarios varga7-fast --policies rhc_foresight --update
   {prog} --test-sets panda-clutter-random --policies rhc_foresight --starts 10 --generations 0 --polished 1
 
-Among bodies, paths of policies replace the receding horizons that the search has of its own, and the roll-out.
+Among bodies, paths of policies replace the receding horizons of the search and the roll-out.
 
 A line for each episode has: its cost and the kind of start that led to it; the norm of the gradient in [s/rad] or
 [s/m]; the number of paths at full resolution within a millionth of the cost; the number of random starts within 1 % of
@@ -97,7 +97,7 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
     If nothing is named: all fixed scenarios and all sets, except those with collisions: a search there takes minutes.
     """
     named = [scenario_registry.get(name) for name in scenarios]
-    drawn = any(map(_drawn, named))
+    drawn = any(map(_is_drawn, named))
     if bool(seeds) != drawn:
         raise InvalidInputError(
             "seeds: expected some for the random scenarios, got none."
@@ -108,15 +108,15 @@ def episodes(scenarios: Sequence[str], test_sets: Sequence[str], seeds: Sequence
         whole_number("seeds", seed, at_least=0)
     if not (scenarios or test_sets):
         every = map(scenario_registry.get, scenario_registry.names())
-        named = [scenario for scenario in every if not (_drawn(scenario) or scenario.collides)]
+        named = [scenario for scenario in every if not (_is_drawn(scenario) or scenario.collides)]
         test_sets = [name for name in known_sets.names() if not known_sets.get(name).scenario.collides]
-    out = [(scenario, Seeds(seed)) for scenario in named for seed in (seeds if _drawn(scenario) else (0,))]
+    out = [(scenario, Seeds(seed)) for scenario in named for seed in (seeds if _is_drawn(scenario) else (0,))]
     for one in map(known_sets.get, test_sets):
         out += [(one.scenario, Seeds(seed, one.arm_seed(seed))) for seed in one.seeds]
     return out
 
 
-def _drawn(scenario: Scenario) -> bool:
+def _is_drawn(scenario: Scenario) -> bool:
     """Whether the trajectories or the arms of episodes differ, and so their best known costs."""
     return scenario.random or scenario.plant.draws_arm
 

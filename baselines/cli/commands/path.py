@@ -72,7 +72,7 @@ def _work(options: Options, _: str) -> None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])
     driven = retimed(found, fastest=options.fastest)
-    head, verdict = ([_folded(line) for line in lines] for lines in (_head(found), _verdict(found, driven)))
+    head, verdict = ([_fold(line) for line in lines] for lines in (_head(found), _verdict(found, driven)))
     print("\n".join([*head, "", _table(every), "", *verdict]))
     if options.retime is not None:
         if driven is None:
@@ -81,7 +81,7 @@ def _work(options: Options, _: str) -> None:
         print(f"\n{options.retime}: {driven.scenario.steps} steps of {driven.scenario.dt:g} s")
 
 
-def _folded(line: str) -> str:
+def _fold(line: str) -> str:
     """A line in the width of the terminal; a start, which is copied into files, stays in one."""
     if line.startswith("start = "):
         return line
@@ -128,7 +128,7 @@ def _tool(scenario: Scenario) -> list[str]:
     asked = "" if limit is None else f", {limit[0]:.3g} m/s was asked, but {limit[1]}"
     turning = f", the tool turns by {angular:.3g} rad/s" if angular > 1e-6 else ""
     lines = [begins, f"  fastest {linear:.3g} m/s{asked}{turning}"]
-    if _unstated(scenario.arm).any():
+    if _find_unstated(scenario.arm).any():
         lines.append("  acceleration limits are not stated (see --acceleration): velocities alone are checked")
     if len(scenario.arm.bodies) or scenario.arm.bodies.unseen:
         count = "bodies" if scenario.collides else "bodies, which do not count here"
@@ -143,7 +143,7 @@ def _table(found: Survey) -> str:
     rows = [head, *(_row(i, branch, found.scenario) for i, branch in enumerate(found.branches[:SHOWN], 1))]
     if all(branch.contact is None for branch in found.branches):
         rows = [(*row[:CLEARANCE], *row[CLEARANCE + 1 :]) for row in rows]
-    return shell.aligned(rows, shell.width())
+    return shell.align(rows, shell.width())
 
 
 def _row(number: int, branch: Branch, scenario: Scenario) -> tuple[str, ...]:
@@ -199,7 +199,7 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
         how += f" (where {PREFERRED} does not: a stop or a singularity is near)"
     elif driven.solver != PREFERRED:
         how += " (its slow joints are spared, which takes less time)"
-    hold = "all limits hold" if not _unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
+    hold = "all limits hold" if not _find_unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
     used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve else ""
     lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]
     if driven.solver != PREFERRED:
@@ -237,7 +237,7 @@ def _free_about_z(found: Survey) -> list[str]:
     ]
 
 
-def _unstated(arm: Arm) -> BoolArray:
+def _find_unstated(arm: Arm) -> BoolArray:
     """Joints without a limit of acceleration. Shape (n,)."""
     unstated: BoolArray = ~np.isfinite(arm.acceleration_limit)
     return unstated
@@ -248,7 +248,7 @@ def _peak(driven: Retimed) -> str:
     arm, motion = driven.scenario.arm, driven.motion
     steps = np.diff(motion.q[:, 0], axis=0, prepend=motion.q[:1, 0])  # from rest
     peaks = np.abs(np.diff(steps, axis=0)).max(axis=0) / motion.times[1] ** 2
-    joint = int(np.argmax(np.where(_unstated(arm), peaks, 0.0)))
+    joint = int(np.argmax(np.where(_find_unstated(arm), peaks, 0.0)))
     return f"accelerations come to {peaks[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
 
 

@@ -52,4 +52,4 @@ def _plain(text: str) -> str:
     return text.replace("``", "`")
 
 
-main = shell.listed("policies", "policy", registry.names, (("what it does",), _policy_row), _policy)
+main = shell.list_command("policies", "policy", registry.names, (("what it does",), _policy_row), _policy)

@@ -56,9 +56,9 @@ def _bodies(scenario: Scenario) -> dict[str, object]:
     if not len(bodies) and not kinds and not bodies.unseen:
         return {}
     count = "an arm that touches something is stopped" if scenario.collides else "do not count"
-    own = {"bodies": describe_bodies(scenario.arm)} if len(bodies) or bodies.unseen else {}
+    arm = {"bodies": describe_bodies(scenario.arm)} if len(bodies) or bodies.unseen else {}
     near = {} if scenario.proximity is None else {"proximity": scenario.proximity}
-    return {**own, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count, **near}
+    return {**arm, **{kind: ", ".join(names) for kind, names in kinds.items()}, "collisions": count, **near}
 
 
 def _accelerations(arm: Arm) -> str:
@@ -92,7 +92,7 @@ def _reach(scenario: Scenario) -> str:
     return f"not all: missed from {first} to {last}, at ({shell.numbers(worst.position)}) m by {far}"
 
 
-main = shell.listed(
+main = shell.list_command(
     "scenarios",
     "scenario",
     lambda: (*scenarios.names(), *scenarios.problems_from_elsewhere()),

@@ -36,7 +36,7 @@ def manual(prog: str) -> str:
     """The text of ``--help`` above the options."""
     return f"""\
 Shows policies side by side in a browser: a replay of the episode at any speed, and arms that follow a target that you
-drag, each with its own policy, without the imperfections of the scenario's plant. Sliders move the joints within their
+drag, each with a policy, without the imperfections of the scenario's plant. Sliders move the joints within their
 limits. Needs pip install "ikgym[view]".
 
 Examples:

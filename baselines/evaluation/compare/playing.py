@@ -87,7 +87,7 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     stated = np.isfinite(scenario.arm.acceleration_limit).all()
     notes = [] if stated else [f"{report.STATED_NOTE}; --acceleration states limits"]
-    paths = [scenario.replace(name=AS_IT_IS), *_retimed(scenario, notes)]
+    paths = [scenario.replace(name=AS_IT_IS), *_retime(scenario, notes)]
     played = evaluate(paths, PREFERRED, progress=progress)
     notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
     rows = [*played]
@@ -106,7 +106,7 @@ def late(plant: Plant) -> Plant:
     return plant.replace(bandwidth=1.0 / (2.0 * math.pi * LAG), command_delay=DELAY)
 
 
-def _retimed(scenario: Scenario, notes: list[str]) -> list[Scenario]:
+def _retime(scenario: Scenario, notes: list[str]) -> list[Scenario]:
     """The path in a time in which it can be driven, if there is one; a note says in which, or why there is none."""
     try:
         found = retime(scenario)

@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from baselines.evaluation import report
-from baselines.evaluation.html.series import BUDGET, thinned
+from baselines.evaluation.html.series import BUDGET, thin
 from baselines.evaluation.metrics import Skipped
 from baselines.evaluation.results import Results
 from baselines.evaluation.summary import REPORT, columns, escape_names
@@ -43,7 +43,7 @@ def page(
         "notes": _items(report.remarks(lines, skipped)),
         "conditions": _items([f"command: {command}", *report.machines(lines)]),
         "parameters": _items(report.parameters(lines)),
-        "data": embedded(data(lines, series)),
+        "data": embed(data(lines, series)),
         "datatables": _file("datatables.min.js"),
         "plotly": get_plotlyjs(),
         "script": _file("page.js"),
@@ -52,7 +52,7 @@ def page(
 
 
 def data(lines: pd.DataFrame, series: Sequence[dict[str, Any] | None]) -> list[dict[str, Any]]:
-    """The data of the plots: costs, times and the thinned trajectory log of each line of the table."""
+    """The data of the plots: costs, times and the thin trajectory log of each line of the table."""
     return [
         {
             **{"scenario": line.scenario, "policy": line.label, "reference": line.reference, "quantity": line.quantity},
@@ -64,10 +64,10 @@ def data(lines: pd.DataFrame, series: Sequence[dict[str, Any] | None]) -> list[d
 
 
 def _series(results: Results, lines: pd.DataFrame) -> list[dict[str, Any] | None]:
-    """The thinned trajectory log of each line; None where there is none."""
+    """The thin trajectory log of each line; None where there is none."""
     logged = [results.series_file(line).exists() for line in lines.itertuples()]
     return [
-        thinned(results.series(line), BUDGET // sum(logged)) if there else None
+        thin(results.series(line), BUDGET // sum(logged)) if there else None
         for line, there in zip(lines.itertuples(), logged, strict=True)
     ]
 
@@ -76,7 +76,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def embedded(content: Any) -> str:
+def embed(content: Any) -> str:
     """JSON within a page: no text in it ends the element that it is in."""
     text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")

@@ -1,4 +1,4 @@
-"""Trajectory logs for the page: thinned, and as text."""
+"""Trajectory logs for the page: fewer rows, as text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STRETCHES, PLATE = 3, 2.0
 FREE, ACCELERATION, VELOCITY, STOP = range(4)
 
 
-def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
+def thin(log: TrajectoryLog, size: int) -> dict[str, Any]:
     """A log at some of its steps, such that no peak is lost: between two of them, the worst is shown.
 
     Args:
@@ -31,7 +31,7 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
         size: Bytes that it may take as text.
 
     Returns:
-        ``arrays`` as :func:`encoded` gives them: ``time``, ``nominal`` positions, ``points`` of the links from the base
+        ``arrays`` as :func:`encode` gives them: ``time``, ``nominal`` positions, ``points`` of the links from the base
         to the tool, ``rotation`` of the tool, and ``q`` at the frames that are kept; of all steps since the one before,
         the largest errors, the ``qdot`` and ``qddot`` that are largest in magnitude, and the worst ``limit``. Besides
         how many steps there were (``rows``), the limits, ``joint_names``, which joints are prismatic, and which points
@@ -60,8 +60,8 @@ def thinned(log: TrajectoryLog, size: int) -> dict[str, Any]:
         arrays["frames"] = log["carrier_frames"][picked].reshape(-1, 12 * carriers)
         surfaces, out["of_bodies"] = _surfaces(log)
         arrays |= surfaces
-    out |= {name: _listed(log[name]) for name in BOUNDS if name in log}
-    return out | {"arrays": {name: encoded(values) for name, values in arrays.items()}}
+    out |= {name: _without_infinity(log[name]) for name in BOUNDS if name in log}
+    return out | {"arrays": {name: encode(values) for name, values in arrays.items()}}
 
 
 def limits(log: TrajectoryLog) -> npt.NDArray[np.uint8]:
@@ -73,7 +73,7 @@ def limits(log: TrajectoryLog) -> npt.NDArray[np.uint8]:
     return out
 
 
-def encoded(values: npt.NDArray[Any]) -> dict[str, Any]:
+def encode(values: npt.NDArray[Any]) -> dict[str, Any]:
     """An array as JSON: its bytes in base64, since JSON has no numbers that are not finite, and in single precision."""
     kept = values.astype(np.uint8 if values.dtype == np.uint8 else "<f4")
     kind = "u1" if kept.dtype == np.uint8 else "f4"
@@ -121,6 +121,6 @@ def _links(log: TrajectoryLog, picked: npt.NDArray[np.int64]) -> tuple[npt.NDArr
     return np.stack([*columns, log["tool"][picked]], axis=1), ends
 
 
-def _listed(values: FloatArray) -> list[float | None]:
+def _without_infinity(values: FloatArray) -> list[float | None]:
     """Limits as JSON; None if there is none."""
     return [value if math.isfinite(value) else None for value in values.tolist()]

@@ -1,6 +1,6 @@
-"""Policies with free timing: their episodes go on to the end of the path, and are measured along it, too.
+"""Policies with free timing: their episodes continue to the end of the path, and are measured along it, too.
 
-Costs, errors and times of a row remain those of the scenario's own steps.
+Costs, errors and times of a row remain those of the steps of the scenario.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def play_to_end(
     timed: bool,
     tick: Tick | None = None,
 ) -> list[Episode]:
-    """Episodes that go on until the end of the path is reached, but at least for the steps of the scenario."""
+    """Episodes that continue until the end of the path is reached, but at least for the steps of the scenario."""
     for factor in LONGER:
         longer = scenario.replace(steps=factor * scenario.steps)
         episodes = rollouts(longer, policy, seeds, preview=preview, timed=timed)

@@ -25,7 +25,7 @@ class Verdict:
     position: float  # largest error in [m]
     orientation: float  # largest error in [rad]
     turn: float  # largest motion of a revolute joint between two waypoints, in [rad]
-    travel: float  # the same of a prismatic joint, in [m]
+    travel: float  # likewise of a prismatic joint, in [m]
     within: bool  # whether the joints are within their limits
     clearance: float  # smallest signed distance between bodies in [m]; infinite where none can meet
 

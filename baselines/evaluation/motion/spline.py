@@ -11,9 +11,9 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
 
-#: Accelerations of the spline may be so many times those of the motion.
+#: Largest ratio of accelerations of the spline to those of the motion.
 EXCESS = 1.095
-#: Accelerations below this share of the largest one of all joints count as so large.
+#: Accelerations below this share of the largest one of all joints count as that share.
 FLOOR = 1e-2
 #: Periods in which the spline catches up with a motion that begins with a jump of its velocity.
 CATCH_UP = 22
@@ -61,7 +61,7 @@ def from_rest(q: FloatArray) -> FloatArray:
     if len(q) < 3:
         return np.zeros_like(q)
     jump = 0.5 * (-3.0 * q[0] + 4.0 * q[1] - q[2])  # in one period
-    return -np.outer(np.arange(len(q)) * (1.0 - _passed(len(q))) ** 2, jump)
+    return -np.outer(np.arange(len(q)) * (1.0 - _progress(len(q))) ** 2, jump)
 
 
 def accelerations(points: Points, dt: float) -> FloatArray:
@@ -78,7 +78,7 @@ def _points(q: FloatArray, dt: float, *, smoothed: bool = False) -> Points:
     if smoothed:
         fading = _fading(len(q))
         control = q - np.outer(fading, (q[1] - q[0]) / (2.0 + fading[1]))
-    # The motion is continued as its own mirror image before the start, and at rest after the end.
+    # The motion is continued as its mirror image before the start, and at rest after the end.
     padded = np.vstack([control[1:2], control, control[-1:]])
     bend = np.diff(padded, 2, axis=0)
     moved = control + bend / 6.0 if smoothed else q.copy()
@@ -88,12 +88,12 @@ def _points(q: FloatArray, dt: float, *, smoothed: bool = False) -> Points:
 
 def _fading(count: int) -> FloatArray:
     """From 1 to 0, with slopes of 0 at both ends. Shape (count,)."""
-    u = _passed(count)
+    u = _progress(count)
     out: FloatArray = 1.0 - u**2 * (3.0 - 2.0 * u)
     return out
 
 
-def _passed(count: int) -> FloatArray:
+def _progress(count: int) -> FloatArray:
     """The share of :data:`CATCH_UP` that has passed, all of it before the last two rows. Shape (count,)."""
     return np.minimum(np.arange(count) / max(1, min(CATCH_UP, count - 2)), 1.0)
 

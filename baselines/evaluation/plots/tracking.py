@@ -28,7 +28,7 @@ def draw(title: str, log: TrajectoryLog) -> Figure:
         axes = drawn.add_subplot(grid[row, :])
         lowest = max(SMALLEST, 0.5 * float(np.percentile(log[kind], 1)))
         axes.set_yscale("log")
-        # Before anything is drawn: matplotlib would first look for limits of its own, which zeros do not have.
+        # Before anything is drawn: matplotlib would first look for limits, which zeros do not have.
         axes.set_ylim(lowest, max(10.0 * lowest, 1.5 * float(log[kind].max())))
         _line(axes, log["time"], np.maximum(log[kind], 0.1 * lowest))
         style.dress(axes, ylabel=ERRORS[kind])

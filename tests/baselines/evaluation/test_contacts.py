@@ -12,7 +12,7 @@ import ikgym
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
-from baselines.evaluation.html.series import BUDGET, thinned
+from baselines.evaluation.html.series import BUDGET, thin
 from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.results import read_rows
@@ -121,7 +121,7 @@ def test_a_log_has_solids_and_closest_points(log):
 
 def test_a_series_has_surfaces_in_the_frames_that_carry_them(log):
     scenario, found = log
-    series = thinned(found, BUDGET)
+    series = thin(found, BUDGET)
     arrays = {name: decoded(values) for name, values in series["arrays"].items()}
     surface, triangles = arrays["surface"], arrays["triangles"].astype(int)
     assert triangles.max() == len(surface) - 1
@@ -131,7 +131,7 @@ def test_a_series_has_surfaces_in_the_frames_that_carry_them(log):
     ball = surface[surface[:, 3] == scenario.joints + 2, :3]
     np.testing.assert_allclose(np.linalg.norm(ball, axis=1), 0.09, rtol=1e-6)
     assert arrays["frames"].shape == (len(arrays["time"]), 12 * 10)
-    few = decoded(thinned(found, 1)["arrays"]["clearance"])
+    few = decoded(thin(found, 1)["arrays"]["clearance"])
     assert few.min() == np.float32(found["clearance"].min())
     usual = {key: values for key, values in found.items() if key != "carrier_frames"}
-    assert not {"surface", "clearance"} & thinned(usual, BUDGET)["arrays"].keys()
+    assert not {"surface", "clearance"} & thin(usual, BUDGET)["arrays"].keys()

@@ -13,7 +13,7 @@ from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.html.series import ACCELERATION, VELOCITY, limits
 from baselines.evaluation.log import trajectory_log
-from baselines.evaluation.metrics import TIME_COLUMNS, Row, followed, lost, measure
+from baselines.evaluation.metrics import TIME_COLUMNS, Row, is_followed, lost, measure
 from baselines.evaluation.summary import summarise
 from baselines.files import from_json
 from baselines.recording import Episode, Seeds
@@ -231,8 +231,8 @@ def test_rows_of_different_content_are_not_put_together(change):
 def test_followed_and_lost_by_position_or_orientation():
     """NaN is lost and not followed."""
     small, nan = (1e-3, 1e-3), math.nan
-    assert all(followed(*errors) for errors in (small, (1e-3, None)))
-    assert not any(followed(*errors) for errors in ((1.01e-3, None), (0.0, 1.01e-3), (nan, 0.0), (0.0, nan)))
+    assert all(is_followed(*errors) for errors in (small, (1e-3, None)))
+    assert not any(is_followed(*errors) for errors in ((1.01e-3, None), (0.0, 1.01e-3), (nan, 0.0), (0.0, nan)))
     assert not lost(0.05, 0.3)
     assert all(lost(*errors) for errors in ((0.0, 0.301), (0.0501, None), (nan, 0.0), (0.0, nan)))
     rows = [row_of(position_scenario(), handmade(position_error=[0.0, 0.0, e, 0.0])) for e in (1e-3, 0.01, 0.06, nan)]

@@ -83,7 +83,7 @@ def test_all_ways_to_play_them_are_the_same():
 
 def test_a_reference_is_told_its_arm():
     (first, second, *_) = planned(SAME_ARM, "told:policy=qp", episodes=2).jobs
-    assert second.given["arm_seed"] == 400_000
+    assert second.arguments["arm_seed"] == 400_000
     assert second.before == 0
     assert first.parameters == second.parameters
     assert second.bind().drawn.arm.offsets[0, 0] == SAME_ARM.drawn_plant(arm_seed=400_000).arm.offsets[0, 0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.evaluation.table import escaped
+from baselines.evaluation.table import escape_markdown
 from baselines.viewer import session as sessions
 from baselines.viewer.following import Approach, Follower
 from baselines.viewer.replay import Stage, play_all
@@ -180,7 +180,7 @@ def test_readings_name_policies_errors_and_limits(session):
     shown = session.shown()
     text, reading = session.text(shown), shown[0].reading
     joint = int(np.argmin(reading.margins))
-    name = escaped(session.stage.scenario.arm.joint_names[joint])
+    name = escape_markdown(session.stage.scenario.arm.joint_names[joint])
     for part in (
         "t = 0.040 s", "**dls**: applied", "**qp**", "manipulability", "cost so far",
         f"error {1e3 * shown[0].position_error:.3g} mm, {1e3 * shown[0].orientation_error:.3g} mrad",

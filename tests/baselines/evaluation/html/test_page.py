@@ -10,7 +10,7 @@ import pytest
 
 from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
-from baselines.evaluation.html.page import embedded, page
+from baselines.evaluation.html.page import embed, page
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import Skipped, describe
 from baselines.evaluation.results import PAGE, Results, read_rows
@@ -55,8 +55,8 @@ def test_nothing_comes_from_elsewhere_and_names_are_text(text):
     assert not re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="(?!data:)', text)
     assert "<script>alert(1)" not in text
     assert [entry["scenario"] for entry in data_of(text)] == [NASTY] * 4 + ["short"] * 4 + ["panda-blocked"]
-    assert json.loads(embedded({"a": "</script><!--"})) == {"a": "</script><!--"}
-    assert "<" not in embedded({"a": "</script><!--"})
+    assert json.loads(embed({"a": "</script><!--"})) == {"a": "</script><!--"}
+    assert "<" not in embed({"a": "</script><!--"})
 
 
 def test_the_table_has_the_numbers_of_the_results(folder):

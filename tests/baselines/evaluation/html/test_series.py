@@ -6,7 +6,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollout
-from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thinned
+from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thin
 from baselines.evaluation.log import FRAMES, frame_rows, trajectory_log
 from baselines.recording import Seeds
 from tests.limited import limited
@@ -52,7 +52,7 @@ def test_joints_are_where_the_arm_has_them(log):
     for row in (0, 200, FRAMES - 1):
         expected = arm.joint_points(log["q"][log["frame"][row]])
         np.testing.assert_allclose(log["joint_points"][row], expected, atol=1e-6)
-    series = thinned(log, BUDGET)
+    series = thin(log, BUDGET)
     points = decoded(series["arrays"]["points"])
     assert points.shape == (FRAMES, 2 + 7 + log["prismatic"].sum(), 3)
     assert (points[:, 0] == 0.0).all()  # the base
@@ -66,7 +66,7 @@ def test_no_peak_is_lost_however_few_rows_are_kept(log, size):
     log["position_error"][333] = 7.0
     log["qdot"][334, 2], log["qdot"][335, 2] = -9.0, 8.0
     log["orientation_error"][100] = np.nan
-    series = thinned(log, size)
+    series = thin(log, size)
     if size == 30_000:
         assert 0.6 * size < sum(len(array["data"]) for array in series["arrays"].values()) <= size
     arrays = {name: decoded(values) for name, values in series["arrays"].items()}
