@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 
@@ -35,12 +34,7 @@ def geometric_interval(values: Sequence[float] | FloatArray) -> tuple[float, flo
     Returns:
         The 2.5th and the 97.5th percentile.
     """
-    return _interval(tuple(map(tuple, np.atleast_2d(values).tolist())))
-
-
-@functools.lru_cache(maxsize=256)  # one evaluation states an interval in several tables
-def _interval(values: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
-    logs = np.log(values)
+    logs = np.log(np.atleast_2d(values))
     seeds, episodes = logs.shape
     generator = np.random.default_rng(0)
     drawn = generator.integers(episodes, size=(RESAMPLES, episodes))

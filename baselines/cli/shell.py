@@ -164,7 +164,8 @@ class Command(Generic[P]):
 
         def both() -> int:
             nonlocal stopped
-            options = parse(self.options, given, prog=prog, description=self.manual(prog), rules=self.rules)
+            manual = self.manual(prog) if {"-h", "--help"} & {*given} else ""
+            options = parse(self.options, given, prog=prog, description=manual, rules=self.rules)
             if self.kept and (out := getattr(options, "out", "")) is not None:
                 stopped = f"Stopped. {self.kept.format(out=out)}"
             with escaped_output():

@@ -1,5 +1,6 @@
 import dataclasses
 import datetime
+import json
 import re
 
 import numpy as np
@@ -13,6 +14,7 @@ from baselines.evaluation import report, run
 from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.plots import tracking
+from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import number
 from baselines.files import ResultsError
@@ -68,14 +70,11 @@ def test_table():
 
 def test_joints_at_stops_and_peaks_without_a_stated_limit_are_marked():
     stopped = row(policy="moore_penrose", parameters={}, steps_at_joint_limit=3)
-    unstated = row(policy="qp", scenario="own", acceleration_stated=False)
-    text = table([BASE, stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1), unstated])
-    assert [line.partition("1.423e7")[0].strip() for line in text.split("\n")[4:7]] == [
-        "dls",
-        "moore_penrose †",
-        "follow_nominal * †",
-    ]
+    text = table([stopped, dataclasses.replace(REFERENCE, steps_at_joint_limit=1)])
+    names = [line.partition("1.423e7")[0].strip() for line in text.split("\n")[4:6]]
+    assert names == ["moore_penrose †", "follow_nominal * †"]
     assert report.STOP_NOTE in text
+    text = table([BASE, row(policy="qp", scenario="mine", acceleration_stated=False)])
     assert re.search(r"^qp:damping=0.001 .* 500\.0 § ", text, re.MULTILINE)
     assert text.count("500.0 §") == 1
     assert report.STATED_NOTE in text
@@ -93,46 +92,42 @@ def test_a_row_knows_whether_accelerations_are_stated(changes, stated):
     assert unlimited.acceleration_stated
 
 
+def cells(line):
+    return re.split(r"\s{2,}", line)
+
+
 def test_several_episodes_are_put_together():
+    given = zip((1, 2, 3), (10.0, 1000.0, 1e6), (0.03, 0.01, 0.2), (5.0, 7.0, 6.0), strict=True)
     rows = [
-        row(
-            scenario="varga7-random", seed=seed, total_cost=cost, position_error_max=error, time_p50_us=time,
-            time_p99_us=2 * time, deadline_misses=seed % 10, solver_status=status, followed=error < 0.2,
-        )
-        for seed, cost, error, time, status in (
-            (2_000_001, 10.0, 0.03, 5.0, "converged"),
-            (2_000_002, 1000.0, 0.01, 7.0, "rank_deficient"),
-            (2_000_003, 1e6, 0.2, 6.0, "iteration_limit"),
-        )
+        row(seed=seed, total_cost=cost, position_error_max=error, time_p50_us=time, time_p99_us=2 * time,
+            deadline_misses=seed, solver_status="rank_deficient" if seed == 2 else "converged", followed=error < 0.2)
+        for seed, cost, error, time in given
     ]  # fmt: skip
     text = table(rows)
-    assert text.startswith("varga7-random: 3 episodes of 3000 steps")
-    cells = "dls 2154 301.2 200.0 16.88 13.31 500.0 6.000 14.00 6 2 of 3 rank_deficient"
-    assert text.split("\n")[4].split() == cells.split()
-    assert "total cost over the episodes of varga7-random" in text
-    (line,) = (line for line in text.split("\n") if "2000003" in line)
-    assert re.split(r"\s{2,}", line) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "2000003", "1"]
+    assert text.startswith("varga7-fast: 3 episodes of 3000 steps")
+    line = "dls 2154 301.2 200.0 16.88 13.31 500.0 6.000 14.00 6 2 of 3 rank_deficient"
+    assert text.split("\n")[4].split() == line.split()
+    last = [line for line in text.split("\n") if line.startswith("dls")][-1]
+    assert cells(last) == ["dls", "3", "2154", "1000", "8.002e5", "1.000e6", "3", "1"]
     assert "geometric means" in text
+    assert "total cost over the episodes of varga7-fast" in text
 
 
 def test_several_episodes_are_judged_by_their_cost_ratio_where_it_is_known():
-    rows = [
-        row(scenario="varga7-random", seed=seed, cost_ratio=cost_ratio, position_error_max=error)
-        for seed, cost_ratio, error in ((7, 1.0, 0.0), (8, 4.0, 0.06), (9, 2.0, 0.0))
-    ]
+    given = zip((7, 8, 9), (1.0, 4.0, 2.0), (0.0, 0.06, 0.0), strict=True)
+    rows = [row(seed=seed, cost_ratio=ratio, position_error_max=error) for seed, ratio, error in given]
     text = table(rows)
-    assert "cost ratio over the episodes of varga7-random" in text
+    assert "cost ratio over the episodes of varga7-fast" in text
     assert "total cost over" not in text
-    line = [line for line in text.split("\n") if line.startswith("dls")][-1]
-    assert re.split(r"\s{2,}", line) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8", "1"]
-    assert re.split(r"\s{2,}", text.split("\n")[4])[3] == "2.000"
-    assert "total cost over" in table([*rows, row(scenario="varga7-random", seed=10)])
+    first, last = (line for line in text.split("\n") if line.startswith("dls"))
+    assert cells(first)[3] == "2.000"
+    assert cells(last) == ["dls", "3", "2.000", "2.000", "3.600", "4.000", "8", "1"]
+    assert "total cost over" in table([*rows, row(seed=10)])
 
 
+TINY = {"total_cost": 1.2345e-100, "tracking_cost": 1.2345e-100, "position_error_max": 1.2345e-9}
 WIDE = [
-    row(
-        solver_status="iteration_limit", total_cost=1.2345e-100, tracking_cost=1.2345e-100, position_error_max=1.2345e-9
-    ),
+    row(solver_status="iteration_limit", **TINY),
     row(policy="rhc_gradient", parameters={"horizon": 50, "alpha_max": 1.2345e-5, "alpha_factor": 1.234}),
     REFERENCE,
 ]
@@ -153,20 +148,9 @@ def test_lines_fit_the_width_and_columns_that_do_not_are_named():
 
 
 def test_labels_say_what_is_not_the_default():
-    rows = [
-        BASE,
-        row(parameters={"gain": 1.0, "damping": 1e-2}),
-        row(policy="unheard_of", parameters={"a": 1}),
-        row(policy="unheard_of", parameters={"a": 2}),
-        row(policy="alone", parameters={"a": 2}),
-    ]
-    assert summarise(rows).label.tolist() == [
-        "dls",
-        "dls:damping=0.01",
-        "unheard_of:a=1",
-        "unheard_of:a=2",
-        "alone",
-    ]
+    given = [("dls", {"gain": 1.0, "damping": 1e-3}), ("dls", {"gain": 1.0, "damping": 1e-2}), ("new", {"a": 1})]
+    rows = [row(policy=policy, parameters=values) for policy, values in [*given, ("new", {"a": 2}), ("one", {"a": 2})]]
+    assert summarise(rows).label.tolist() == ["dls", "dls:damping=0.01", "new:a=1", "new:a=2", "one"]
 
 
 def test_readme():
@@ -183,12 +167,25 @@ def test_readme():
         assert part in text
 
 
-def test_control_characters_and_line_breaks_of_names_are_escaped(tmp_path):
-    name = "a\x1b[31m\n\u202eb"
-    evaluate(ikgym.scenarios.get("varga7-fast").replace(name=name), "dls", steps=3, out=tmp_path, report=False)
-    text = (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert text.isprintable() or set(text) & {"\x1b", "\u202e", "\r"} == set()
-    assert r"a\x1b[31m\n\u202eb: 3 steps" in text
+def test_control_characters_and_line_breaks_of_names_are_escaped(tmp_path, capsys):
+    """In all files that are read by people, and in the progress bar; the name itself stays."""
+    name, bad = "a\x1b[31m\n\u202eb\x9b", {"\x1b", "\u202e", "\x9b"}
+    scenario = ikgym.scenarios.get("varga7-fast").replace(name=name)
+    joints = scenario.arm.replace(joint_names=[f"{name}{i}" for i in range(7)])
+    evaluate(scenario.replace(arm=joints), "dls", steps=3, out=tmp_path, progress=True, export="joint-trajectory")
+    readme, results = (tmp_path / file for file in ("README.md", "results.json"))
+    (motion,) = tmp_path.glob("export/*/*.json")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for text in (*(file.read_text(encoding="utf-8") for file in (readme, results, motion)), capsys.readouterr().err):
+        assert not set(text) & bad
+    shown = r"a\x1b[31m\n\u202eb\x9b"
+    assert f"{shown}: 3 steps" in readme.read_text(encoding="utf-8")
+    assert f"<td>{shown}</td>" in page
+    ours = re.sub(r"<script(?! type=.application/json).*?</script>", "", page, flags=re.DOTALL)  # without libraries
+    assert not set(ours) & bad
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])[0]
+    assert (data["scenario"], data["series"]["joint_names"][0]) == (shown, f"{shown}0")
+    assert read_rows(results)[0].scenario == name
 
 
 def test_nothing_in_a_name_is_markup_in_the_readme():
