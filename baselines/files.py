@@ -65,7 +65,9 @@ def write_json(file: pathlib.Path, value: object) -> None:
 def json_text(value: object, indent: int | None = None) -> str:
     """A value as JSON, with a line break at its end; what a terminal cannot show is escaped in it."""
     text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
-    return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n"
+    if not text.replace("\n", "").isprintable():
+        text = "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
+    return text + "\n"
 
 
 def csv_text(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:

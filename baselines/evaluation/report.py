@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Skipped
-from baselines.evaluation.summary import BESIDE_IDEAL, FOLLOWED_NOTE, POLICIES, SPREAD, columns, escape_names
+from baselines.evaluation.summary import FOLLOWED_NOTE, POLICIES, SPREAD, WITH_IDEAL, columns, escape_names
 from baselines.evaluation.table import NOTHING, plain
 from baselines.oracle import best_known
 from ikgym.exceptions import printable
@@ -67,7 +67,7 @@ def table(lines: pd.DataFrame, skipped: Sequence[Skipped] = (), *, width: int = 
         text, left_out = plain(columns(POLICIES, here), here, width)
         absent.update(dict.fromkeys(column.title for column in left_out))
         parts.append(f"{heading(here)}\n{text}")
-        spread = SPREAD * bool((here.episodes > 1).any()) + BESIDE_IDEAL * bool(here.times_ideal.notna().any())
+        spread = SPREAD * bool((here.episodes > 1).any()) + WITH_IDEAL * bool(here.times_ideal.notna().any())
         if spread:
             text, _ = plain(columns(("label", *spread), here), here, width)
             parts.append(f"{here.quantity.iloc[0]} over the episodes of {scenario}\n{text}")

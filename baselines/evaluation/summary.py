@@ -7,7 +7,7 @@ import dataclasses
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,10 +94,8 @@ def _columns() -> Iterable[Column]:
     yield Column("path_time_s", "path time", "[s]", about, of="path_time", how=_largest)
     about = "largest distance from the reference at the policy's own progress, with free timing"
     yield Column("path_error_mm", "path err", "[mm]", about, of="path_position_error", how=_largest_in_thousandths)
-    smallest: Callable[[pd.Series], float] = lambda values: 1e3 * values.min()  # noqa: E731
-    yield Column(
-        "clearance_mm", "clearance", "[mm]", "smallest distance between bodies", of="clearance_min", how=smallest
-    )
+    about = "smallest distance between bodies"
+    yield Column("clearance_mm", "clearance", "[mm]", about, of="clearance_min", how=lambda values: 1e3 * values.min())
     yield Column("stopped", "stopped", "", "episodes in which bodies would have met", how=_total, format=count)
     yield Column("time_p50_us", "p50", "[µs]", "median time of a call after the first", how="median")
     yield Column("time_p99_us", "p99", "[µs]", "99th percentile of these times", how="max", drop=5)
@@ -141,7 +139,7 @@ TIMES = ("time_p50_us", "time_p99_us", "deadline_misses")
 #: The table of all policies; of several episodes; of the comparison with ideal plants; and of the report.
 POLICIES = ("label", "total_cost", "tracking_cost", "cost_ratio", *ERRORS, *WHERE, *TIMES, "followed", "solver_status")
 SPREAD = ("episodes", "mean", "median", "p90", "worst", "worst_seed", "lost")
-BESIDE_IDEAL = ("ideal_cost_ratio", "times_ideal", "times_ideal_low")
+WITH_IDEAL = ("ideal_cost_ratio", "times_ideal", "times_ideal_low")
 AT_LIMITS = tuple(f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))
 REPORT = (
     *("cost_ratio", "ratio_low", "ratio_worst", "total_cost", "followed", "lost", "episodes", *TIMES, *ERRORS, *WHERE),
@@ -165,14 +163,14 @@ def summarise(rows: Iterable[Row]) -> pd.DataFrame:
         InvalidInputError: Two scenarios share a name, or rows belong to different test sets.
     """
     episodes = _label_episodes(rows)
-    known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
-    episodes["value"] = episodes.cost_ratio.where(known, episodes.total_cost)
-    lines = _lines(episodes, _LINE)
+    lines = _lines(episodes, _LINE, episodes.total_cost)
     lines.loc[lines.episodes == 1, ["low", "high"]] = np.nan
-    all_known = lines.groupby("scenario").unknown.transform("sum") == 0
-    lines["quantity"] = np.where(all_known, RATIO, TOTAL)
-    lines = lines.assign(ratio_low=lines.low.where(all_known), ratio_worst=lines.worst.where(all_known))
-    return lines.merge(_beside_ideal(episodes), how="left", on=_LINE)
+    lines = lines.assign(
+        quantity=np.where(lines.known, RATIO, TOTAL),
+        ratio_low=lines.low.where(lines.known),
+        ratio_worst=lines.worst.where(lines.known),
+    )
+    return lines.merge(_compare_with_ideal(episodes), how="left", on=_LINE)
 
 
 def escape_names(lines: pd.DataFrame) -> pd.DataFrame:
@@ -197,17 +195,15 @@ def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
     episodes = _label_episodes(rows)
     texts = {text: parse_policy(text) for text in policies if registry.known(text.partition(":")[0])}
     episodes["label"] = [_label(line, texts) or line.label for line in episodes.itertuples()]
-    known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
     # Costs too small for a ratio count as the smallest allowed.
     lowest = episodes.groupby(["scenario", "seed"]).total_cost.transform("min").clip(lower=best_known.MEANINGLESS)
-    episodes["value"] = episodes.cost_ratio.where(known, episodes.total_cost / lowest)
-    lines = _lines(episodes, ["scenario", "label"])
-    lines["relative_to"] = np.where(lines.groupby("scenario").unknown.transform("sum") == 0, BEST_KNOWN, LOWEST)
-    lines["cost_ratio"] = lines["mean"]
-    places = {name: place for place, name in enumerate(lines.scenario.unique())}
-    return lines.sort_values(
-        ["scenario", "cost_ratio"], key=lambda values: values.map(places) if values.name == "scenario" else values
-    ).reset_index(drop=True)
+    lines = _lines(episodes, ["scenario", "label"], episodes.total_cost / lowest)
+    lines = lines.assign(
+        relative_to=np.where(lines.known, BEST_KNOWN, LOWEST),
+        cost_ratio=lines["mean"],
+        place=pd.factorize(lines.scenario)[0],
+    )
+    return lines.sort_values(["place", "cost_ratio"]).drop(columns="place").reset_index(drop=True)
 
 
 def _label_episodes(rows: Iterable[Row]) -> pd.DataFrame:
@@ -243,11 +239,17 @@ _ABOUT: Mapping[str, tuple[str, Any]] = {
     "noisy": ("noise_seed", "any"),
     "stated": ("acceleration_stated", "all"),
     "unknown": ("cost_ratio", lambda ratios: ratios.isna().sum()),
+    "known": ("known", "all"),
 }
 
 
-def _lines(episodes: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
-    """One line for each group of episodes: all columns, and the spread of the values over the episodes."""
+def _lines(episodes: pd.DataFrame, keys: list[str], otherwise: pd.Series) -> pd.DataFrame:
+    """One line for each group of episodes: all columns, and the spread of the values over the episodes.
+
+    The values are cost ratios if all of the scenario are `known`, and otherwise the other ones.
+    """
+    known = episodes.groupby("scenario").cost_ratio.transform(lambda ratios: ratios.notna().all())
+    episodes = episodes.assign(known=known, value=episodes.cost_ratio.where(known, otherwise))
     groups = episodes.groupby(keys, sort=False)
     about = {name: how for name, how in _ABOUT.items() if name not in keys}
     shown = {key: (column.of or key, column.how) for key, column in COLUMNS.items() if column.how is not None}
@@ -267,9 +269,8 @@ def _spread(key: tuple[Any, ...], rows: pd.DataFrame) -> dict[str, Any]:
 
     The value of an episode is the geometric mean over its noise seeds.
     """
-    by_seed = [
-        some.groupby("seed", sort=False).value.agg(geometric_mean) for _, some in rows.groupby("text", sort=False)
-    ]
+    trained = rows.groupby("text", sort=False)
+    by_seed = [some.groupby("seed", sort=False).value.agg(geometric_mean) for _, some in trained]
     seeds = by_seed[0].index
     if any(list(one.index) != list(seeds) for one in by_seed):
         raise InvalidInputError(f"{key[1]}: expected the same episodes of all training seeds.")
@@ -287,17 +288,11 @@ def _spread(key: tuple[Any, ...], rows: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _beside_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
+def _compare_with_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
     """Each line compared with the same policy on an ideal plant, by the seeds of both."""
     keys = [*_LINE, "policy", "fingerprint", "ideal", "seed"]
-    costs = (
-        episodes.groupby(keys, sort=False, dropna=False)
-        .agg(
-            cost=("total_cost", geometric_mean),
-            ideal_ratio=("cost_ratio", _geometric),
-        )
-        .reset_index()
-    )
+    means = {"cost": ("total_cost", geometric_mean), "ideal_ratio": ("cost_ratio", _geometric)}
+    costs = episodes.groupby(keys, sort=False, dropna=False).agg(**means).reset_index()
     ideal = costs.fingerprint == costs.ideal
     plain = costs[ideal].drop_duplicates(["fingerprint", *_POLICY, "seed"], keep="last")
     pairs = costs[~ideal].merge(
