@@ -64,14 +64,11 @@ def test_a_row_has_the_smallest_clearance_where_nothing_stops(rows):
     assert row.closest_step == found.distances.argmin() + 1
 
 
-def test_rows_are_read_again_also_those_of_before(rows):
+def test_rows_are_read_again_also_older_ones(rows):
     _, folder = rows
-    file = folder / "results.json"
-    assert read_rows(file) == list(rows[0])
-    assert [getattr(rows[0][2], name) for name in COLUMNS] == [None] * 4
-    old = json.loads(file.read_text())[2:]
-    for name in COLUMNS:
-        del old[0][name]
+    assert read_rows(folder / "results.json") == list(rows[0])
+    old = json.loads((folder / "results.json").read_text())[2:]
+    assert [old[0].pop(name) for name in COLUMNS] == [None] * 4
     (folder / "old.json").write_text(json.dumps(old))
     assert read_rows(folder / "old.json") == [rows[0][2]]
     first, *_ = csv.DictReader((folder / "results.csv").read_text().splitlines())
@@ -96,16 +93,12 @@ def test_a_wrapped_policy_is_measured_alike(rows):
     class Plain:
         preview = 1
 
-        def __init__(self):
-            self.policy = baselines.make("dls", blocked())
-
-        def predict(self, observation, state=None, episode_start=None, deterministic=True):
-            return self.policy.predict(observation, state)
+        def predict(self, observation, state=None, episode_start=None, deterministic=True, dls=[]):  # noqa: B006
+            dls += [baselines.make("dls", blocked())] * (not dls)
+            return dls[0].predict(observation, state)
 
     (row,) = evaluate(blocked(), Plain(), wrap=gym.wrappers.OrderEnforcing)
-    expected = rows[0][0]
-    assert (row.stopped, row.clearance_min) == (expected.stopped, expected.clearance_min)
-    assert row.closest_pair == expected.closest_pair
+    assert [getattr(row, name) for name in COLUMNS] == [getattr(rows[0][0], name) for name in COLUMNS]
 
 
 def test_a_log_has_solids_and_closest_points(log):

@@ -54,12 +54,9 @@ def test_the_error_is_the_distance_from_the_path_itself():
     assert one.position_error_max == played.position_error[: scenario.steps].max()
 
 
-def test_a_path_that_can_be_driven_takes_its_own_time():
+def test_the_time_is_that_of_the_path_or_none_if_its_end_is_not_reached():
     scenario = circle()
     assert row(scenario).path_time == pytest.approx(scenario.steps * scenario.dt, rel=1e-9)
-
-
-def test_a_path_whose_end_is_not_reached_has_no_time():
     scenario = too_fast()
     one = row(scenario.replace(arm=scenario.arm.replace(velocity_limit=0.05 * scenario.arm.velocity_limit)))
     assert one.path_time is None

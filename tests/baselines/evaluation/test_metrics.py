@@ -128,19 +128,17 @@ def test_metrics_equal_a_plain_numpy_computation():
     velocity = which.cost.velocity(episode.qdot).sum()
 
     assert_allclose(episode.q, q, rtol=0, atol=1e-13)
-    assert_allclose(row.tracking_cost, tracking, rtol=1e-9)
-    assert_allclose(row.velocity_cost, velocity, rtol=1e-12)
-    assert_allclose(row.total_cost, tracking + velocity, rtol=1e-9)
-    assert_allclose(row.position_error_max, distance.max(), rtol=1e-9)
-    assert_allclose(row.position_error_rms, math.sqrt((distance**2).mean()), rtol=1e-9)
+    differences = sum(np.abs(b - a).sum() for a, b in zip(episode.qdot, episode.qdot[1:], strict=False))
+    expected = {
+        "tracking_cost": tracking, "velocity_cost": velocity, "total_cost": tracking + velocity,
+        "position_error_max": distance.max(), "position_error_rms": math.sqrt((distance**2).mean()),
+        "qdot_peak": np.abs(episode.qdot).max(), "qdot_rms": math.sqrt((episode.qdot**2).sum() / (80 * 7)),
+        "qdot_total_variation": differences,
+    }  # fmt: skip
+    assert {name: getattr(row, name) for name in expected} == pytest.approx(expected, rel=1e-9)
     assert_allclose(row.orientation_error_max, angle.max(), rtol=1e-5)
     assert_allclose(row.orientation_error_rms, math.sqrt((angle**2).mean()), rtol=1e-5)
-    assert row.qdot_peak == np.abs(episode.qdot).max()
-    assert_allclose(row.qdot_rms, math.sqrt((episode.qdot**2).sum() / (80 * 7)), rtol=1e-12)
-    differences = sum(np.abs(b - a).sum() for a, b in zip(episode.qdot, episode.qdot[1:], strict=False))
-    assert_allclose(row.qdot_total_variation, differences, rtol=1e-12)
-    assert (row.scenario, row.policy, row.seed, row.steps) == ("varga7-fast", "dls", 0, 80)
-    assert row.cost_ratio is None
+    assert (row.scenario, row.policy, row.seed, row.steps, row.cost_ratio) == ("varga7-fast", "dls", 0, 80, None)
 
 
 def test_held_points_count_at_their_last_step_only():
@@ -156,45 +154,32 @@ def test_held_points_count_at_their_last_step_only():
     velocity = sum(which.cost.velocity(episode.qdot[k]) for k in (1, 3, 5))
     distance = np.linalg.norm(gap, axis=1)
 
-    assert_allclose(row.tracking_cost, tracking, rtol=1e-9)
-    assert_allclose(row.velocity_cost, velocity, rtol=1e-12)
-    assert_allclose(row.position_error_max, distance.max(), rtol=1e-9)
-    assert_allclose(row.position_error_rms, math.sqrt((distance**2).mean()), rtol=1e-9)
+    expected = {
+        "tracking_cost": tracking, "velocity_cost": velocity,
+        "position_error_max": distance.max(), "position_error_rms": math.sqrt((distance**2).mean()),
+        # Of the joint velocities all steps count.
+        "qdot_peak": np.abs(episode.qdot).max(), "qdot_rms": np.sqrt((episode.qdot**2).mean()),
+    }  # fmt: skip
+    assert {name: getattr(row, name) for name in expected} == pytest.approx(expected, rel=1e-9)
     assert row.position_error_max < episode.position_error.max()  # the steps between are worse
-    # Of the joint velocities all steps count.
-    assert row.qdot_peak == np.abs(episode.qdot).max()
-    assert_allclose(row.qdot_rms, np.sqrt((episode.qdot**2).mean()), rtol=1e-12)
 
 
 def test_numbers_of_a_handmade_episode():
-    qdot = [[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [-2.0, 0.5, 0.0], [0.0, 0.5, 0.0]]
-    times = [1_000, 2_000, 3_000, 1_000_000_001]
+    times = [1_000, 2_000, 3_000, 1_000_000_001]  # Δt is 1 s
     status = [Status.CONVERGED, Status.DIVERGED, Status.CONVERGED, Status.ITERATION_LIMIT]
-    row = row_of(
-        position_scenario(),  # Δt is 1 s
-        handmade(
-            qdot=qdot,
-            time_ns=times,
-            status=status,
-            iterations=[1, 2, 3, 6],
-            position_error=[0.0, 3.0, 4.0, 0.0],
-            tracking_cost=[1.0, 2.0, 3.0, 4.0],
-            velocity_cost=[0.5, 0.5, 0.5, 0.5],
-        ),
-    )
-    assert row.qdot_peak == 2.0
-    assert row.qdot_rms == pytest.approx(math.sqrt(9.5 / 12))
-    assert row.qdot_total_variation == pytest.approx(3.0 + 0.5 + 2.0)
-    assert row.time_first_us == 1.0
-    assert row.time_p50_us == pytest.approx(3.0)
-    assert row.time_p99_us == pytest.approx(np.percentile(times[1:], 99) / 1e3)
-    assert row.deadline_misses == 1
-    assert (row.solver_status, row.followed) == ("diverged", False)
+    qdot = [[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [-2.0, 0.5, 0.0], [0.0, 0.5, 0.0]]
+    costs = {"tracking_cost": [1.0, 2.0, 3.0, 4.0], "velocity_cost": [0.5] * 4}
+    others = {"iterations": [1, 2, 3, 6], "position_error": [0.0, 3.0, 4.0, 0.0]}
+    row = row_of(position_scenario(), handmade(qdot=qdot, time_ns=times, status=status, **costs, **others))
+    expected = {
+        "qdot_peak": 2.0, "qdot_rms": math.sqrt(9.5 / 12), "qdot_total_variation": 3.0 + 0.5 + 2.0,
+        "time_first_us": 1.0, "time_p50_us": 3.0, "time_p99_us": np.percentile(times[1:], 99) / 1e3,
+        "deadline_misses": 1, "solver_status": "diverged", "followed": False, "iterations": 3.0,
+        "position_error_max": 4.0, "position_error_rms": 2.5,
+        "total_cost": 12.0, "tracking_cost": 10.0, "velocity_cost": 2.0,
+    }  # fmt: skip
+    assert {name: getattr(row, name) for name in expected} == pytest.approx(expected)
     assert row.status_counts == {"converged": 2, "iteration_limit": 1, "diverged": 1}
-    assert row.iterations == 3.0
-    assert row.position_error_max == 4.0
-    assert row.position_error_rms == pytest.approx(2.5)
-    assert (row.total_cost, row.tracking_cost, row.velocity_cost) == (12.0, 10.0, 2.0)
 
 
 def test_what_was_not_timed_has_no_times():

@@ -79,31 +79,25 @@ def test_the_interval_is_that_of_the_cost_ratio_over_the_episodes():
     assert (entry.low[0], entry.high[0]) == (low, high)
     assert cells(entry)["95 %"] == (str(low), f"{low:.4g} … {high:.4g}")
     assert "95 %" not in cells(summarise(rows[:1]))
-
-
-def test_total_costs_are_not_shown_as_ratios():
-    """A policy whose best known costs are all known, beside one with an episode of which none is."""
+    # Total costs are no ratios: a policy with best known costs, next to one with an episode without.
     rows = [dataclasses.replace(BASE, seed=seed, cost_ratio=2.0) for seed in (0, 1)]
     rows += [dataclasses.replace(BASE, policy="other", seed=seed, cost_ratio=None) for seed in (0, 5)]
-    lines = summarise(rows)
-    first, second = lines.iloc[[0]], lines.iloc[[1]]
-    assert cells(first)["cost ratio"] == ("2.0", "2.000")
-    assert not {"95 %", "worst"} & {*cells(first), *cells(second)}
+    first, second = (cells(summarise(rows).iloc[[line]]) for line in (0, 1))
+    assert first["cost ratio"] == ("2.0", "2.000")
+    assert not {"95 %", "worst"} & {*first, *second}
     known = [dataclasses.replace(row, scenario="known") for row in rows[:2]]
-    text = table(summarise([*rows[2:], *known]))
-    assert text.count(f'data-order="{LAST}">–') >= 3  # the ratio, its interval and the worst
+    # The ratio, its interval and the worst of the other one.
+    assert table(summarise([*rows[2:], *known])).count(f'data-order="{LAST}">–') >= 3
 
 
 def test_missing_numbers_are_dashes_and_sorted_last():
-    lost = {"total_cost": math.nan, "position_error_max": math.inf}
     missing = dict.fromkeys(("time_p50_us", "deadline_misses", "orientation_error_max"))
-    worst = dataclasses.replace(BASE, **lost, **missing)
-    entry = summarise([worst])
-    line = cells(entry)
+    worst = dataclasses.replace(BASE, total_cost=math.nan, position_error_max=math.inf, **missing)
+    line = cells(summarise([worst]))
     assert not {"total cost", "p50 [µs]", "ori max [mrad]"} & set(line)
-    two = table(summarise([worst, dataclasses.replace(BASE, policy="other")]))
-    assert two.count(f'data-order="{LAST}">–') == 4  # costs, orientation, time and its misses
     assert line["lost"] == ("1", "1")
+    # Costs, orientation, time and its misses.
+    assert table(summarise([worst, dataclasses.replace(BASE, policy="b")])).count(f'data-order="{LAST}">–') == 4
 
 
 def test_the_series_are_those_of_the_first_episodes(folder, text):
