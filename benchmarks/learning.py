@@ -30,13 +30,12 @@ from baselines.training.options import Rewards
 from baselines.training.rewards import train
 from baselines.training.zoo import ALGORITHMS, SETTINGS, read_entries, read_settings
 from ikgym import rl
+from ikgym.rl.scoring import EPISODES
 
 DOCS = Path(__file__).parents[1] / "docs"
 CURVES, TABLE, PICTURE = DOCS / "results/learning_runs.csv", DOCS / "results/learning.csv", DOCS / "images/learning.png"
 #: What one training is known by, and what a line of the table is about.
 RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("environment", "algorithm", "settings")
-#: Episodes of the split `test`.
-EPISODES = 256
 #: CPU time of a run with the defaults of the library, which know no number of steps, in [min].
 MINUTES = 4.0
 Line = dict[str, Any]
@@ -104,8 +103,8 @@ def table(lines: Sequence[Line]) -> list[Line]:
     out = []
     for group, found in _groups(lines).items():
         last = [line for line in found if line["test_log_cost"]]
-        cost = np.expm1([[float(line["test_log_cost"])] for line in last])
-        score = rl.score({group[0]: cost})[group[0]]
+        cost = np.expm1([[float(line["test_log_cost"])] * EPISODES for line in last])
+        score = rl.score({group[0]: cost}, "test")[group[0]]
         steps, seconds = (float(np.median([float(one[name]) for one in last])) for name in ("steps", "core_seconds"))
         effort = {"steps": int(steps), "core_minutes": round(seconds / 60.0, 1)}
         scores = {"score": score.mean, "low": score.low, "high": score.high, "best": score.best}

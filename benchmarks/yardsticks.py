@@ -1,9 +1,9 @@
-"""Costs that scores of agents are measured by: ``python -m benchmarks.yardsticks``, in some minutes.
+"""Costs that scores of agents are measured by: ``python -m benchmarks.yardsticks``, in about half an hour.
 
-For each environment by id: an arm that stands still; `dls` with the best gain and damping on episodes of the split
-`validation`; and the least cost of an episode that any of some policies reaches, which on a plant are told how the arm
-deviates and have exact sensors without delay. The reward threshold of an id is the return of `dls` that is damped until
-its score is 0.8.
+For each environment by id and each of the episodes that agents are scored on: the cost of an arm at rest; of `dls` with
+the best gain and damping on episodes of the split `validation`; and the least cost that any of some policies reaches,
+which know the deviations of the plant and have exact sensors without delay. The reward threshold of an id is the return
+of `dls` that is damped until its score is 0.8.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ from baselines.episodes import rollout, rollouts
 from baselines.recording import Episode
 from baselines.spec import parse_policy
 from ikgym import rl, scenarios
-from ikgym.rl.scoring import FILE
+from ikgym.rl.scoring import EPISODES, FILE
 from ikgym.rl.track import UNIT
 from ikgym.rl.track_kernels import distance_rewards
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
 
-EPISODES = 64
 #: Settings of `dls`.
 GAINS, DAMPINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0), (1e-3, 1e-2, 0.03, 0.1)
 #: Policies one of which has the best cost of an episode.
@@ -88,27 +87,27 @@ def tuned(scenario: Scenario, steps: int | None) -> str:
     return min(specs, key=lambda spec: float(counted(scenario, spec, seeds, steps).mean()))
 
 
-def measured(name: str, split: str, dls: str) -> dict[str, float]:
-    """Mean logarithms of 1 + cost of an environment."""
+def measure(name: str, split: str, dls: str) -> dict[str, FloatArray]:
+    """Logarithms of 1 + cost of the yardsticks of an environment. Shapes (episodes,)."""
     task = rl.IDS[name].task
     scenario, seeds = scenarios.find(task.scenario), scenarios.seeds(split, EPISODES)
-    least = counted(scenario, dls, seeds, task.counted)
-    means = {"still": float(np.log1p(rl.costs(Still(), name, split=split, episodes=EPISODES)).mean())}
-    means["dls"] = float(least.mean())
+    still = np.log1p(np.asarray(rl.costs(Still(), name, split=split, episodes=EPISODES)))
+    tuned_dls = least = counted(scenario, dls, seeds, task.counted)
     for policy in (dls, *BEST):
-        plant, told = informed(scenario, policy)
-        least = np.minimum(least, counted(plant, told, seeds, task.counted))
-    return {name: round(value, 6) for name, value in {**means, "best": float(least.mean())}.items()}
+        plant, privileged = informed(scenario, policy)
+        least = np.minimum(least, counted(plant, privileged, seeds, task.counted))
+    return {"still": still, "dls": tuned_dls, "best": least}
 
 
-def threshold(name: str, dls: str, own: Mapping[str, float]) -> float:
+def threshold(name: str, dls: str, yardsticks: Mapping[str, FloatArray]) -> float:
     """The mean return of `dls` in an environment with the damping that takes its score down to 0.8."""
     task, seeds, points = rl.IDS[name].task, scenarios.seeds("validation", EPISODES), []
     scenario, (solver, parameters) = scenarios.find(task.scenario), parse_policy(dls)
+    still, one = yardsticks["still"].mean(), yardsticks["dls"].mean()
     for damping in DAMPED:
         policy = baselines.make(solver, scenario, **{**parameters, "damping": damping})
         episodes = rollouts(scenario, policy, seeds)
-        score = (own["still"] - logarithms(episodes, task.counted).mean()) / (own["still"] - own["dls"])
+        score = (still - logarithms(episodes, task.counted).mean()) / (still - one)
         points.append((float(score), float(returns(task, episodes).mean())))
     scores, means = np.array(sorted(points)).T
     return round(float(np.interp(SOLVED, scores, means)), 6)
@@ -116,15 +115,17 @@ def threshold(name: str, dls: str, own: Mapping[str, float]) -> float:
 
 def main() -> None:
     """Measures all of them and writes the file."""
-    out: dict[str, Any] = {"dls_settings": {}, "validation": {}, "test": {}, "thresholds": {}}
+    out: dict[str, Any] = {"dls_settings": {}, "thresholds": {}, "validation": {}, "test": {}}
     for name, kind in rl.IDS.items():
         dls = tuned(scenarios.find(kind.task.scenario), kind.task.counted)
-        out["dls_settings"][name] = dls
-        for split in ("validation", "test"):
-            out[split][name] = measured(name, split, dls)
-            print(name, split, dls, out[split][name], flush=True)
-        out["thresholds"][name] = threshold(name, dls, out["validation"][name])
-    FILE.write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
+        costs = {split: measure(name, split, dls) for split in ("validation", "test")}
+        out["dls_settings"][name], out["thresholds"][name] = dls, threshold(name, dls, costs["validation"])
+        for split, yardsticks in costs.items():
+            out[split][name] = {policy: values.round(4).tolist() for policy, values in yardsticks.items()}
+            print(
+                name, split, dls, {policy: values.mean().round(3) for policy, values in yardsticks.items()}, flush=True
+            )
+    FILE.write_text(json.dumps(out).replace("}, ", "},\n").replace("], ", "],\n") + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -96,8 +96,8 @@ def update(agent: Agent, optimiser: torch.optim.Optimizer, batch: dict[str, torc
 
 def score(agent: Agent) -> float:
     """The score on validation episodes, played to their end also where the track is lost."""
-    costs = ikgym.rl.costs(agent, ID, split="validation", episodes=32)
-    return ikgym.rl.score({ID: [costs]}, split="validation")[ID].mean
+    costs = ikgym.rl.costs(agent, ID, episodes=32)
+    return ikgym.rl.score({ID: [costs]})[ID].mean
 
 
 def main(updates: int = 240, seed: int = 0) -> float:

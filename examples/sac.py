@@ -38,8 +38,8 @@ def main(folder: Path, steps: int = 50_000, filmed: int = 200) -> float:
     file = folder / "track-sac.zip"
     train(steps, file)
     model = SAC.load(file, device="cpu")
-    costs = ikgym.rl.costs(model, ID, split="validation", episodes=32)
-    score = ikgym.rl.score({ID: [costs]}, split="validation")[ID].mean
+    costs = ikgym.rl.costs(model, ID, episodes=32)
+    score = ikgym.rl.score({ID: [costs]})[ID].mean
     film(model, folder / "videos", filmed)
     print(f"score {score:.2f} after {steps} steps: 0 is an arm that stands still, 1 is tuned dls")
     return score

@@ -81,8 +81,8 @@ def main(updates: int = 200, seed: int = 0) -> float:
     envs.set_seed(seed)
     actor, critic = networks(envs.observation_spec["observation"].shape[-1], envs.action_spec.shape[-1])
     train(envs, actor, critic, updates)
-    costs = ikgym.rl.costs(Policy(actor), ID, split="validation", episodes=32)
-    score = ikgym.rl.score({ID: [costs]}, split="validation")[ID].mean
+    costs = ikgym.rl.costs(Policy(actor), ID, episodes=32)
+    score = ikgym.rl.score({ID: [costs]})[ID].mean
     print(f"score {score:.2f} after {updates} updates")
     return score
 

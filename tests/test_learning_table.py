@@ -56,7 +56,9 @@ def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
     assert [bool(line["test_log_cost"]) for line in lines] == [*[False] * (len(lines) - 1), True]
     [row] = learning.table(lines)
     assert row["seeds"] == 1
-    assert row["best"] == pytest.approx(rl.score({"ikgym/Track-v0": [[1.0]]})["ikgym/Track-v0"].best, abs=1e-3)
+    assert row["best"] == pytest.approx(
+        rl.score({"ikgym/Track-v0": [[1.0] * learning.EPISODES]}, "test")["ikgym/Track-v0"].best, abs=1e-3
+    )
     assert read_settings(training.config)["n_envs"] == 64
     [panel] = learning.picture(lines).axes
     assert len(panel.lines) == 1

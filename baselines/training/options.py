@@ -17,6 +17,7 @@ from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.frozen import Frozen
 from ikgym.kernels.tasks import SKEW
+from ikgym.rl.scoring import EPISODES
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_name, known_names, number, whole_number
 
@@ -237,7 +238,7 @@ class Rewards(Frozen):
     """Take the defaults of the library and one arm in place of settings."""
     validations: _Count = 10
     """Rows of the curve, evenly spaced."""
-    episodes: _Count = 32
+    episodes: Annotated[int, _N, functools.partial(whole_number, at_least=1, at_most=EPISODES)] = 32
     """Episodes of a validation."""
 
     def __post_init__(self) -> None:

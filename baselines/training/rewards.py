@@ -130,7 +130,7 @@ class Curve(BaseCallback):
     def validate(self) -> float:
         """The present score on episodes of the split `validation`, which is written to the file."""
         env, episodes = self._config.env, self._config.episodes
-        score = rl.score({env: [rl.costs(self.model, env, episodes=episodes)]}, "validation")[env].mean
+        score = rl.score({env: [rl.costs(self.model, env, episodes=episodes)]})[env].mean
         self._rows.append((f"{self.spent:.1f}", str(self.num_timesteps), f"{score:.4f}"))
         write(self._file, csv_text(("core_seconds", "steps", "score"), self._rows).encode())
         self._since = time.process_time()

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
@@ -18,10 +17,21 @@ from ikgym.rl.ids import IDS, TaskEnv
 from ikgym.rl.task import Task
 from ikgym.validation import FloatArray, float_array, known_name, known_names, shortened, whole_number
 
-#: Costs of the yardsticks, by split and id; ``python -m benchmarks.yardsticks`` measures them.
+#: Logarithms of 1 + cost of the yardsticks by split and id, one number an episode; ``python -m benchmarks.yardsticks``
+#: measures them, on the first episodes of each split.
+EPISODES = 256
 FILE = pathlib.Path(__file__).with_name("yardsticks.json")
 #: Resamples of a bootstrap interval.
 RESAMPLES = 2000
+
+
+class Costs(np.ndarray[Any, np.dtype[np.float64]]):
+    """Costs of episodes, one number each, and the split of their seeds."""
+
+    split: str | None = None
+
+    def __array_finalize__(self, source: Any) -> None:
+        self.split = getattr(source, "split", None)
 
 
 class Score(NamedTuple):
@@ -40,7 +50,7 @@ class Score(NamedTuple):
     best: float
 
 
-def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 64) -> FloatArray:
+def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 64) -> Costs:
     """Plays whole episodes, also beyond where training would end them.
 
     Args:
@@ -64,7 +74,9 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
     steps = list(play(model, kind.task, seeds))
     for infos in steps[-(kind.task.counted or 0) :]:
         total += infos["tracking_cost"] + infos["velocity_cost"]
-    return total
+    out = total.view(Costs)
+    out.split = split
+    return out
 
 
 def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
@@ -82,10 +94,12 @@ def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any
         yield infos
 
 
-def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str, Score]:
+def score(results: Mapping[str, Any], split: str = "validation") -> dict[str, Score]:
     """Scores of agents, linear in the logarithm of 1 + cost.
 
-    >>> ikgym.rl.score({"ikgym/Track-v0": [ikgym.rl.costs(model, "ikgym/Track-v0", split="test") for model in models]})
+    >>> ikgym.rl.score({"ikgym/Track-v0": [ikgym.rl.costs(model, "ikgym/Track-v0") for model in models]})
+
+    The yardsticks are measured on the episodes that are scored, the first ones of the split.
 
     Args:
         results: Costs of :func:`costs` by id, one row a training seed. Shape (seeds, episodes).
@@ -93,12 +107,14 @@ def score(results: Mapping[str, npt.ArrayLike], split: str = "test") -> dict[str
 
     Raises:
         UnknownNameError: There is no such environment or split.
-        InvalidInputError: Costs are not of that shape, not finite or below 0.
+        InvalidInputError: Costs are not of that shape, not finite or below 0, of more than 256 episodes, or of another
+            split.
     """
     if not isinstance(results, Mapping):
         raise InvalidInputError(f"results: expected costs by the id of their environment, got {shortened(results)}.")
     known_names("environment", results, IDS)
-    return {name: _score(name, value, yardsticks(split)[name]) for name, value in results.items()}
+    known_name("split", split, [name for name in scenarios.SPLITS if name in _yardsticks()])
+    return {name: _score(name, value, split) for name, value in results.items()}
 
 
 def environment(name: str) -> type[TaskEnv]:
@@ -107,11 +123,9 @@ def environment(name: str) -> type[TaskEnv]:
     return IDS[name]
 
 
-def yardsticks(split: str) -> dict[str, dict[str, float]]:
-    """Mean logarithms of 1 + cost by id: `still`, `dls` and `best`."""
-    known_name("split", split, [one for one in _yardsticks() if one in scenarios.SPLITS])
-    found: dict[str, dict[str, float]] = _yardsticks()[split]
-    return found
+def yardsticks(name: str, split: str, episodes: int) -> dict[str, float]:
+    """Mean logarithms of 1 + cost over the first episodes of a split: `still`, `dls` and `best`."""
+    return {policy: float(np.mean(values[:episodes])) for policy, values in _yardsticks()[split][name].items()}
 
 
 def interquartile_mean(values: FloatArray) -> FloatArray:
@@ -121,10 +135,16 @@ def interquartile_mean(values: FloatArray) -> FloatArray:
     return kept
 
 
-def _score(name: str, value: npt.ArrayLike, yardstick: Mapping[str, float]) -> Score:
+def _score(name: str, value: Any, split: str) -> Score:
+    rows = value if isinstance(value, (list, tuple)) else [value]
+    other = {row.split for row in rows if isinstance(row, Costs)} - {None, split}
+    if other:
+        raise InvalidInputError(f"{name}: expected costs of the split {split!r}, got some of {other.pop()!r}.")
     cost = float_array(name, value)
     if cost.ndim != 2 or 0 in cost.shape or (cost < 0.0).any():
         raise InvalidInputError(f"{name}: expected costs of at least 0 of shape (seeds, episodes), got {cost.shape}.")
+    episodes = whole_number(f"{name}: episodes", cost.shape[1], at_least=1, at_most=EPISODES)
+    yardstick = yardsticks(name, split, episodes)
 
     def to_score(logarithm: Any) -> Any:
         return (yardstick["still"] - logarithm) / (yardstick["still"] - yardstick["dls"])

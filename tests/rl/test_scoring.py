@@ -20,17 +20,41 @@ from ikgym.rl.scoring import FILE, interquartile_mean, yardsticks
 TRACK = "ikgym/Track-v0"
 
 
-def cost_of(score, name=TRACK, split="test"):
+def cost_of(score, episodes=4, split="validation"):
     """A cost with a score, by the definition."""
-    own = yardsticks(split)[name]
-    return np.expm1(own["still"] + score * (own["dls"] - own["still"]))
+    found = yardsticks(TRACK, split, episodes)
+    return np.expm1(found["still"] + score * (found["dls"] - found["still"]))
 
 
 def test_it_is_linear_in_the_logarithm_and_may_exceed_1():
     for wanted in (0.0, 0.4, 1.0, 1.2):
-        found = rl.score({TRACK: np.full((5, 3), cost_of(wanted))})[TRACK]
+        found = rl.score({TRACK: np.full((5, 4), cost_of(wanted))})[TRACK]
         assert found[:3] == pytest.approx((wanted, wanted, wanted))
-    assert rl.score({TRACK: [[np.expm1(yardsticks("test")[TRACK]["best"])]]})[TRACK].mean == pytest.approx(found.best)
+    best = np.expm1(yardsticks(TRACK, "validation", 4)["best"])
+    assert rl.score({TRACK: [[best] * 4]})[TRACK].mean == pytest.approx(found.best)
+
+
+@pytest.mark.parametrize("split", ["validation", "test"])
+@pytest.mark.parametrize("name", [TRACK, "ikgym/Reach-v0"])
+def test_the_yardsticks_are_those_of_the_episodes_that_are_scored(name, split):
+    """Whatever their number: on the first ones of a split alone an arm at rest has a score of exactly 0."""
+    assert yardsticks(name, split, 2) != yardsticks(name, split, 256)
+    for episodes in (1, 3):
+        found = rl.costs(Still(), name, split=split, episodes=episodes)
+        assert rl.score({name: [found]}, split)[name].mean == pytest.approx(0.0, abs=1e-4)
+    task = rl.IDS[name].task
+    scenario, seeds = scenarios.get(task.scenario), scenarios.seeds(split, 3)
+    settings = json.loads(FILE.read_text(encoding="utf-8"))["dls_settings"][name]
+    tuned = np.expm1(counted(scenario, settings, seeds, task.counted))
+    assert rl.score({name: [tuned]}, split)[name].mean == pytest.approx(1.0, abs=1e-4)
+
+
+def test_costs_of_another_split_or_of_too_many_episodes_are_refused():
+    found = rl.costs(Still(), TRACK, episodes=2)
+    with pytest.raises(InvalidInputError, match="expected costs of the split 'test', got some of 'validation'"):
+        rl.score({TRACK: [found, found]}, "test")
+    with pytest.raises(InvalidInputError, match="episodes: expected a whole number from 1 to 256, got 257"):
+        rl.score({TRACK: np.ones((1, 257))})
 
 
 def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
@@ -71,10 +95,10 @@ def test_tasks_out_of_range_are_refused(changes):
 
 
 @pytest.mark.parametrize("name", rl.IDS)
-def test_yardsticks_stand_in_their_order(name):
+def test_yardsticks_are_in_their_order(name):
     for split in ("validation", "test"):
-        own = yardsticks(split)[name]
-        assert own["best"] <= own["dls"] < own["still"]
+        found = yardsticks(name, split, 256)
+        assert found["best"] <= found["dls"] < found["still"]
 
 
 @pytest.mark.parametrize("name", rl.IDS)
@@ -105,7 +129,6 @@ def test_an_arm_that_stands_still_costs_what_the_benchmark_says(name):
     costs = np.sum(steps[-(task.counted or 0) :], axis=0)
     found = rl.costs(Still(), name, episodes=2)
     assert found == pytest.approx(costs, rel=1e-12)
-    assert rl.score({name: [found]}, "validation")[name].mean == pytest.approx(0.0, abs=0.2)
 
 
 def test_settings_of_yardsticks_play_the_same_steps():

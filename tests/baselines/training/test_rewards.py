@@ -163,7 +163,7 @@ def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
             return model.predict(observation, deterministic=deterministic)
 
     one, other = (rl.costs(player, TRACK, episodes=2) for player in (model, Forgetful()))
-    assert rl.score({TRACK: [one]}, "validation")[TRACK].mean == about["validation_score"]
+    assert rl.score({TRACK: [one]})[TRACK].mean == about["validation_score"]
     assert (one != other).all()
 
 
