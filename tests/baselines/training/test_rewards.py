@@ -182,7 +182,7 @@ def test_the_defaults_of_the_library_are_those_of_its_policy_with_memory():
     (["ppo", "--env", TRACK, "--settings", "FILE", "--defaults"], "no effect with --defaults"),
     (["ppo", "--env", TRACK, "--settings", "missing.yml"], "Cannot read missing.yml"),
     (["ppo", "--env", TRACK, "--minutes", "0"], "minutes: expected a finite number above 0"),
-    (["ppo", "--env", TRACK, "--episodes", "0"], "episodes: expected a whole number of at least 1"),
+    (["ppo", "--env", TRACK, "--episodes", "0"], "episodes: expected a whole number from 1 to 256, got 0"),
 ])  # fmt: skip
 def test_mistakes_are_named(words, message, settings, tmp_path, capsys):
     words = [str(settings) if word == "FILE" else word for word in words]
