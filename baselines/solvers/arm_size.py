@@ -49,7 +49,7 @@ def error_weights(task: Task, metres: float) -> FloatArray:
         1 for components of the position, the square of ``metres`` for others. Shape (e,).
     """
     weights = np.full(task.error_size, metres * metres)
-    # The position is first beside rotation vectors and axes, last behind parts of a matrix.
+    # The position is first with rotation vectors and axes, last with parts of a matrix.
     weights[slice(0, 3) if task.kind in (task_kernels.POSE, task_kernels.AXIS) else slice(-3, None)] = 1.0
     return weights
 

@@ -36,7 +36,7 @@ def bodies_of(block):
 
 @kernel
 def near_work(n, bodies):
-    """Arrays that :func:`near_distances` works with, for n joints and so many bodies."""
+    """Arrays that :func:`near_distances` works with, for n joints and a number of bodies."""
     near = np.empty(PAIRS), np.empty((PAIRS, 2), np.int64), np.empty((PAIRS, 6))
     return np.empty((n, 6)), np.empty((bodies, PLACED)), np.empty(6), near
 

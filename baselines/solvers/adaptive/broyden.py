@@ -96,12 +96,12 @@ class Broyden(DampedLeastSquares):
     frame as the Jacobian is.
 
     A rank-one formula learns along the motion only; across it B stays as it was. So it learns a correction,
-    from 0, of the model's Jacobian at q; the formula acts on their sum. Broyden's method as it stands, where B only
+    from 0, of the model's Jacobian at q; the formula acts on their sum. Broyden's method itself, where B only
     starts as the model's Jacobian, is lost on a long way or after a singular start.
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         damping: λ, see :class:`DampedLeastSquares`.
         motion: ε, the length of a joint shift from which half is learnt, in [rad] or [m]; shorter ones say little,
             and a joint shift of 0 nothing. Above 0.

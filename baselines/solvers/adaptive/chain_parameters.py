@@ -18,7 +18,7 @@ from ikgym.kernels.kinematics import Chain
 
 @inner
 def changed_chain(chain, parameters, offsets, axes, tool):
-    """The chain with the parameters but for the joint zeros; its parts become those arrays of (n, 3), (n, 3), (3,)."""
+    """The chain with the parameters except the joint zeros; its parts become those arrays of (n, 3), (n, 3), (3,)."""
     n = axes.shape[0]
     for i in range(n):
         ax, ay, az = chain.axes[i, 0], chain.axes[i, 1], chain.axes[i, 2]
@@ -37,7 +37,7 @@ def changed_chain(chain, parameters, offsets, axes, tool):
 
 @inlined
 def _axis_turn(rotation, axis, q, after):
-    """Turns a frame about an axis of its own by an angle: shapes (3, 3), (3,), a number, (3, 3)."""
+    """Turns a frame about one of its axes by an angle: shapes (3, 3), (3,), a number, (3, 3)."""
     s, half = math.sin(q), math.sin(0.5 * q)
     v = 2.0 * half * half
     x, y, z = axis[0], axis[1], axis[2]
@@ -99,7 +99,7 @@ def parameter_twists(chain, q, position, twist):
         _put(twist, i, _cross(axis, arm), axis)
         for j in range(2):
             direction = u if j == 0 else v
-            # A tilt turns all links after it before the joint's own rotation, and back after it.
+            # A tilt turns all links after it before the rotation of the joint, and back after it.
             for k in range(3):
                 tilt[k] = 0.0
                 for c in range(3):

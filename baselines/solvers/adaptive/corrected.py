@@ -138,7 +138,7 @@ class Corrected(NamedWrapper, abc.ABC):
         Args:
             batch: Observations.
             measured: Which rows have a new pose, and the joint coordinates where it was measured.
-            own: The wrapper's own memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
+            own: The wrapper's memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
                 must not be changed in place.
             out: Receives the deviations at the present joint coordinates. Shape (B, 6).
             old: Receives the ones without the measurement. Shape (B, 6).

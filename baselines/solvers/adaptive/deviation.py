@@ -1,8 +1,8 @@
 """Kernels: how far poses are from those of a model, as a twist that can be added to and taken from task coordinates.
 
 A deviation has six numbers: the shift of the position in [m], then the rotation vector δ in [rad] with R = exp(δ) R̂ in
-the base frame. Skew coordinates do not tell an orientation: theirs is the difference of the coordinates instead. Parts
-that the task does not have are 0.
+the base frame. Skew coordinates do not determine an orientation: theirs is the difference of the coordinates instead.
+Parts that the task does not have are 0.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class PredictedMemory(NamedTuple):
         sums: Sums over time of its squares and products. Shape (B, n, 4, D, L).
         samples: How many measurements are in a sum. Shape (B,).
         delay: The delay that is taken to be right, in steps. Shape (B, n).
-        lag: The same of T. Shape (B, n).
+        lag: T that is taken to be right. Shape (B, n).
         doubt: By how many steps a hypothesis that is not refuted differs from those two at most: in their sum, and in
             the delay alone. Shape (B, n, 2).
         sent: The last command in [rad/s] or [m/s]. Shape (B, n).
@@ -298,7 +298,7 @@ def mixture(lag, lags):
 
 @inlined
 def past(path, lag, lags, steps):
-    """Where a joint was so many steps ago, by a lag; steps may have fractions. Shapes (H, L) and (L,)."""
+    """Where a joint was a number of steps ago, by a lag; steps may have fractions. Shapes (H, L) and (L,)."""
     low, high, share = mixture(lag, lags)
     i = min(int(steps), path.shape[0] - 2)
     late = min(steps - i, 1.0)

@@ -85,8 +85,8 @@ class ArmFilters(Corrected, abc.ABC):
         history: See :class:`Corrected`.
         blend: See :class:`Corrected`.
         zero: Standard deviation of the joint zeros before anything is measured, in [rad] or [m]. Of at least 0.
-        link: The same of each part of the offsets from joint to joint, and of the tool point, in [m].
-        axis: The same of each of the two tilts of an axis, in [rad].
+        link: Standard deviation of each part of the offsets from joint to joint, and of the tool point, in [m].
+        axis: Standard deviation of each of the two tilts of an axis, in [rad].
         start: How far from its reference the arm begins an episode, as a standard deviation in [m] and [rad]: where it
             has been jogged there, that is the best measurement of all. None where it may begin anywhere.
         keep: Whether the estimate of the arm survives the start of an episode, and is cleared with the state alone.

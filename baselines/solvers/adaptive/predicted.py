@@ -53,7 +53,7 @@ class Predicted(NamedWrapper):
     rules out other delays and lags, up to what is stable if a delay changes by two steps, and up to the Kalman gain
     where white noise of q outweighs the errors of the simulated drives.
 
-    Unknown drives are identified joint by joint from measured joint coordinates and the policy's own commands, see
+    Unknown drives are identified joint by joint from measured joint coordinates and the commands of the policy, see
     :mod:`baselines.solvers.adaptive.drives`; ``delay`` and ``bandwidth`` are the guess that holds until there is
     evidence for others. The memory begins anew with each episode.
 
@@ -180,7 +180,7 @@ class Predicted(NamedWrapper):
         return self.inner.problem.limits, tuple(servo)
 
     def _observe(self, batch: Batch, kept: PredictedMemory) -> FloatArray:
-        """Takes in the measurements, and tells how far the arm is from where the drives should have brought it."""
+        """Reads the measurements; returns how far the arm is from where the drives should have brought it."""
         share, problem = np.full(len(batch.q), self.gain), self.problem
         if not kept.begun.all():
             fresh = ~kept.begun

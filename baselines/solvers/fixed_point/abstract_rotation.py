@@ -140,13 +140,13 @@ class AbstractRotation(CompiledPolicy):
         q(n+1) = AdaptiveDeform(𝒲 𝒩 J̃ᵀ ℱ f, q(n), 𝒲 𝒩 J̃ᵀ ℱ xᴺ),
 
     that is q(n), extended by a ninth number to the length R_a, turned by λ_a times the angle between the other two,
-    in their plane. Where all three are short beside R_a this is q + λ_a 𝒲 𝒩 J̃ᵀ ℱ (xᴺ - f): a transposed-Jacobian
+    in their plane. Where all three are short compared with R_a this is q + λ_a 𝒲 𝒩 J̃ᵀ ℱ (xᴺ - f): a transposed-Jacobian
     step, which contracts for λ_a σ_max² < 2 if the model is close. A vector b that is not short, |b| = R_a sin β,
     makes the step 1/cos β times longer along b, and cos β times shorter across. At rest J̃ᵀ ℱ (xᴺ - f) = 0, up to
     the listing's limiting by tanh, which shrinks q by about q³ / (3 q_pp_max²) in every step: the joints move slowly
     towards 0 in the directions that the task leaves free.
 
-    The counter-rotation 𝒩 turns h(n) = J̃ᵀ ℱ (xᴺ - f) into the direction of h(n-1), as it was before its own
+    The counter-rotation 𝒩 turns h(n) = J̃ᵀ ℱ (xᴺ - f) into the direction of h(n-1), as it was before its
     rotation; otherwise no direction could ever change. It is n × n, without which eq. 3.16 does not fit together
     (the conclusion says 12 dimensions). h is remembered from point to point, and is not known at the first step,
     where 𝒩 = I. Between opposite vectors the plane is not determined, see :func:`rotations.plane`. Read with the
@@ -160,7 +160,7 @@ class AbstractRotation(CompiledPolicy):
     step the method is slow along the directions of small σ, in which an error takes 1 / (λ_a σ²) steps: some 25,000 on
     the paper's arm, where σ² reaches from 0.08 to 340. Fails where the model's Jacobian points away from the arm's:
     then the error stays or grows, and the status never says ``converged`` of that. Where a vector is not shorter than
-    R_a the status is ``not_a_rotation``, and the arm stands still until the target has come nearer.
+    R_a the status is ``not_a_rotation``, and the arm rests until the target has come nearer.
 
     Args:
         problem: The scenario as the policy knows it.

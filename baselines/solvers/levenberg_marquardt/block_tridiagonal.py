@@ -4,7 +4,7 @@ With Ψ̄ = L D, L the block lower triangle of identities and D = blockdiag(J_1 
 
     ΔQ = (Ψ̄ᵀ Ψ̄ + λ I)⁻¹ Ψ̄ᵀ r    becomes    ΔQ = Dᵀ (D Dᵀ + λ M)⁻¹ d,    d_j = r_j - r_(j-1),  r_0 = 0,
 
-where M = L⁻¹ L⁻ᵀ is block tridiagonal: -I beside the diagonal, and I, 2I, … 2I on it. At λ = 0 the blocks come
+where M = L⁻¹ L⁻ᵀ is block tridiagonal: -I next to the diagonal, and I, 2I, … 2I on it. At λ = 0 the blocks come
 apart, which is the shortcut (38).
 """
 

@@ -21,7 +21,7 @@ from ikgym.validation import FloatArray, float_array, frozen_array, known_name
 
 LOOKUP, PROPORTIONAL, STEPPED = 0, 1, 2
 
-# Keeps a growing λ finite: at this size the arm stands still.
+# Keeps a growing λ finite: at this size the arm rests.
 LARGEST = 1e100
 
 

@@ -20,7 +20,7 @@ LIMIT, SATURATED = int(Status.ITERATION_LIMIT), int(Status.SATURATED)
 # [1/s], and from which share of a gradient on they are the way out.
 APPROACH, GENTLE, ASIDE = 0.25, 10.0, 0.02
 # Share of a missing clearance that a step takes back, and share of the acceleration limits that braking
-# reckons with: the joints have a task besides.
+# assumes: the joints also have a task.
 RETREAT, BRAKES = 0.1, 0.5
 # A joint motion that changes a distance by less than this for a unit of it is no way to change it, in [m]; shares of
 # the largest joint velocities and, in [1/s], of the way to a stop that lead away from near bodies.

@@ -27,7 +27,7 @@ class VelocityProgram(ResolvedRate, abc.ABC):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         damping: Weight of the joint motion as a share of that of the task. Above 0.
         lm_damping: How much that grows with the error. At least 0.
         secondary_gain: K in [1/s] of the way to a posture, at least 0 and below 2/Δt; 0 for the smallest joint
@@ -35,10 +35,10 @@ class VelocityProgram(ResolvedRate, abc.ABC):
             error ask for, so that an arm at rest stays at rest. By default 2.5 there, else 1, and at most 1/Δt.
         posture: q* in [rad] or [m]; one number, or one a joint. If left out, the model's home; where it has none, the
             middle of the limits, and joints without limits are left alone.
-        braking_share: Share of the acceleration limits that braking at the reference reckons with. At most 1; 0 takes
-            back the same share of all errors.
+        braking_share: Share of the acceleration limits assumed for braking at the reference. At most 1; 0 corrects
+            the same fraction of all errors.
         rotation_weight: Weight of the rotation against the position, in [m/rad]: 1 rad of rotation error counts as
-            much as so many metres of position error, where limits do not allow both to vanish. Above 0; it changes
+            much as that many metres of position error, where limits do not allow both to vanish. Above 0; it changes
             nothing in tasks without orientation. Skew and matrix coordinates count as rad.
         joint_weights: w, above 0: how costly the motion of a joint is; only ratios count. One number, or one a joint.
             If left out, (v_max / v)^1.5 of the largest joint velocities v, so that slow joints do little of what others

@@ -10,7 +10,7 @@ from ikgym.kernels.linear_algebra import cholesky, cholesky_solve
 # State of a variable: free, or at its lower or upper bound. One that is kept was released by rounding alone, and stays
 # at its bound until the others have moved.
 FREE, BOUND, KEPT = 0, 1, 2
-# A slope of this share of its own terms is rounding, and no reason to leave a bound.
+# A slope of this share of its terms is rounding, and no reason to leave a bound.
 ROUNDING = 1e-13
 # Solves for each variable before the search is given up; problems of 8 variables have taken 2 to 12 in all.
 MOST = 20
@@ -123,7 +123,7 @@ def _advance(target, lower, upper, x, state):
 
 @uncounted
 def _most_held_back(hessian, linear, lower, upper, x, state):
-    """The variable whose release lowers the function the most, by its own slope and curvature; NONE at the optimum."""
+    """The variable whose release lowers the function the most, by its slope and curvature; NONE at the optimum."""
     found, most = NONE, 0.0
     for i in range(x.shape[0]):
         if state[i] != BOUND or lower[i] == upper[i]:

@@ -146,7 +146,7 @@ class PathFollowing(VelocityProgram):
 
     The progress s in one step, from 0 to 1 steps of the reference, is one more variable of the quadratic program:
     ‖J q̇ Δt − s Δx − e‖² + w (s* − s)² ‖Δx‖² + w ρ ‖q̇ − z‖²_W is minimised over q̇ and s, with w = 0.01, the motion Δx
-    of the reference, and the error e against the reference at the arm's own progress. Path comes before speed, and
+    of the reference, and the error e against the reference at the progress of the arm. Path comes before speed, and
     speed before joint motion. Lost time is not made up for: no path is followed faster than it is shown.
 
     s* is the largest speed from which the arm can come to rest where the view ends, within the limits of velocity and
@@ -154,7 +154,7 @@ class PathFollowing(VelocityProgram):
     remembered until they are passed, and are joined by a cubic spline. More than 1 cm or
     0.01 rad off the path the progress is slower, and from twice that on the reference waits for the arm.
 
-    The status is ``saturated`` where a joint stands at a bound and the error that is left weighs more than the motion,
+    The status is ``saturated`` where a joint is at a bound and the error that is left weighs more than the motion,
     and where the arm is as late as it may be, and is led on at full speed.
 
     Args:
@@ -163,7 +163,7 @@ class PathFollowing(VelocityProgram):
             :class:`VelocityProgram`.
         lookahead: How far ahead the reference is seen, in [s]: as long as the arm needs for braking.
         longest_lateness: How far the arm may fall behind the reference, in [s].
-        acceleration_share: Share of the acceleration limits that the speed along the path reckons with. Above 0, at
+        acceleration_share: Share of the acceleration limits assumed for the speed along the path. Above 0, at
             most 1.
 
     Raises:

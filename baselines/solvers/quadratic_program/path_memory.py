@@ -16,7 +16,7 @@ class PathMemory(NamedTuple):
     """Memory of path following.
 
     Attributes:
-        samples: Task coordinates of the reference; sample k stands at k modulo L. Shape (B, L, m).
+        samples: Task coordinates of the reference; sample k is at k modulo L. Shape (B, L, m).
         steps: Steps made. Shape (B,).
         progress: How far along the reference, in steps of it. Shape (B,).
         speed: Progress in the last step. Shape (B,).

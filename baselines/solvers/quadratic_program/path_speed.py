@@ -89,7 +89,7 @@ def path_speed(tangents, stride, part, last, fastest, change):
 
 @uncounted
 def _largest_square(tangent, other, steps, square, change):
-    """The largest square of the speed at a place, for that at another one so many steps of the reference away.
+    """The largest square of the speed at a place, for that at another one some steps of the reference away.
 
     The joint velocities t ṡ change by less than the time between the places allows: with ṡ₀ ṡ₁ ≈ (ṡ₀² + ṡ₁²) / 2,
     |(t₁ - 3 t₀) ṡ₀² + (3 t₁ - t₀) ṡ₁²| is at most 4 h times the largest change in one step.

@@ -14,8 +14,8 @@ from ikgym.kernels.tasks import AXIS, POSE
 
 # Weight of the length of a task shift against its direction, and of joint motion against that.
 SCALING_WEIGHT = 1e-2
-# The error of a path that an arm rather takes on than stand still, and the motion in one step below which the path
-# itself stands still, in [m] or [rad].
+# The error of a path that an arm accepts rather than rest, and the motion in one step below which the path
+# itself rests, in [m] or [rad].
 TAKEN_ON, STILL = 1e-5, 1e-9
 
 
@@ -74,10 +74,10 @@ def factorise(hessian, factor):
 
 @inner
 def feedback_share(factor, jacobian, error, part, changes):
-    """The share of an error that can be taken back at once, if the joints are to brake in time when it is gone.
+    """The fraction of an error that can be corrected at once, if the joints are to brake in time when it is gone.
 
     If a joint is too fast for that, all are slowed down by one factor, which keeps the direction. A ``part`` of the
-    largest ``changes`` of the velocity in one step, (n,), is reckoned with; the factor of H has shape (n, n), J Δt
+    largest ``changes`` of the velocity in one step, (n,), is assumed; the factor of H has shape (n, n), J Δt
     (e, n).
     """
     n = jacobian.shape[1]
@@ -143,13 +143,13 @@ def goal_to_scale(jacobian, shift, weight, weights, preferred, aim, hessian, lin
         weight: See :func:`motion_weight`.
         weights: Those of the joints. Shape (n,).
         preferred: Preferred joint velocities. Shape (n,).
-        aim: The s that is aimed at; the error that the arm rather takes on than stand still; and the largest ‖Δx‖ that
+        aim: The s that is aimed at; the error that the arm accepts rather than rest; and the largest ‖Δx‖ that
             counts as standing still.
         hessian: H of the joints, which receives the last row and column. Shape (n + 1, n + 1).
         linear: Receives g. Shape (n + 1,).
 
     Returns:
-        ‖Δx‖, 0 where it stands still.
+        ‖Δx‖, 0 at rest.
     """
     (e, n), (share, taken_on, still), length = jacobian.shape, aim, 0.0
     for a in range(e):
@@ -210,7 +210,7 @@ def row_program(model, numbers, q, last, change, jacobian, motion, error, prefer
         change: By how much they differed from those before. Shape (n,).
         jacobian: J, which becomes J Δt with the weight of the rotation. Shape (e, n).
         motion: Motion of the reference, which becomes the task shift Δx. Shape (e,).
-        error: The present error, which becomes the share of it that is taken back. Shape (e,).
+        error: The present error, which becomes the part of it that is corrected. Shape (e,).
         preferred: Preferred joint velocities. Shape (n,).
         program: Receives H, g, lower and upper bounds.
 

@@ -61,16 +61,16 @@ class QuadraticProgram(VelocityProgram):
     z is K (q* − q) without what would move the task, at most half of the joint motion that the reference asks for, in
     the norm of W: the posture is approached while the arm moves along its path, at both ends of which z vanishes.
 
-    The share of the present error that is taken back is made smaller where the joints could not brake in time once it
+    A smaller fraction of the error is corrected where the joints could not brake in time once it
     is gone. Without that an arm with acceleration limits swings about a reference that it has lost.
 
     With `task_scaling` the task shift is scaled by an s between 0 and 1: ‖J q̇ Δt − s Δx‖² + w (1 − s)² ‖Δx‖² +
     w ρ ‖q̇ − z‖²_W is minimised over q̇ and s, with w = 0.01, so that direction comes before length, and length before
     joint motion. Where the bounds allow s Δx, the motion leaves its line by (1 − s) ‖Δx‖ / 10 at most, mostly by much
-    less. The price is singularities, where the arm may stand still or lead its joints astray.
+    less. The price is singularities, where the arm may rest, or its joints drift.
 
     Such programs are the standard of differential inverse kinematics; with these limits in Flacco, De Luca and
-    Khatib 2015 and in Pink. The status is ``saturated`` where a joint stands at a bound and the task error that is left
+    Khatib 2015 and in Pink. The status is ``saturated`` where a joint is at a bound and the task error that is left
     weighs more than the motion.
 
     Where bodies matter, each pair of them nearer than d* = `influence` has a row ∇dᵀ q̇ >= −v: a velocity damper
@@ -85,7 +85,7 @@ class QuadraticProgram(VelocityProgram):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         damping, lm_damping, secondary_gain, posture, braking_share, rotation_weight, joint_weights: See
             :class:`VelocityProgram`.
         task_scaling: Whether to keep the direction of the task velocity.

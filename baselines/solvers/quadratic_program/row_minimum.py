@@ -10,7 +10,7 @@ from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.linear_algebra import cholesky, dot
 
 # A normal whose part off the active ones is below this share of it is a combination of them; a constraint that is
-# missed by less, in units of its own normal and relative to 1 or its bound, holds.
+# missed by less, in units of its normal and relative to 1 or its bound, holds.
 DEPENDENT, ROUNDING = 1e-9, 1e-11
 # Steps for each variable before the search is given up.
 MOST = 20

@@ -130,7 +130,7 @@ class SaturationInNullSpace(ResolvedRate):
 
     Args:
         problem: The scenario as the policy knows it, with the limits of the model.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         damping: Added to the squared singular values of J W^-½, as a share of the mean of ‖J_j‖² / w_j over the joints
             j. Smaller squares count as lost rank. At least 0; then those below rounding do, and are left out.
         joint_weights, braking_share: See :class:`VelocityProgram`.

@@ -59,7 +59,7 @@ class RecedingHorizonGradient(SolverPolicy):
         alpha_min: Smallest α.
         alpha_max: Largest α.
         alpha_factor: Factor by which α grows or shrinks. At least 1.
-        alpha_start: ``"restart"`` where α starts at `alpha_min` in each control period, ``"kept"`` where it goes on
+        alpha_start: ``"restart"`` where α starts at `alpha_min` in each control period, ``"kept"`` where it continues
             from the period before.
         warm_start: ``"unshifted"`` where a descent starts from the last plan as it was, ``"shifted"`` where that moves
             on by one grid point, its last velocity being repeated.

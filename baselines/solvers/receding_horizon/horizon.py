@@ -131,7 +131,7 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     """:func:`analytic_state_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in q.
 
     With these two a difference by a velocity in :func:`difference_gradient` is the sum of the differences by that
-    velocity and by the states that it moves, but for rounding.
+    velocity and by the states that it moves, up to rounding.
     """
     steps, n = q.shape
     cost, dt, workspace, total = data.cost, data.dt, frame_workspace(data.kind, nominal), 0.0

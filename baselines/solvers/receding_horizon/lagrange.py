@@ -56,8 +56,8 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
     **Against the plain method.** g is ∇Φ projected onto the kernel of A, the velocities' part of it is
     M⁻¹ ∂Φ/∂q̇ with the plain gradient ∂Φ/∂q̇ along the constraints and ‖g‖² = (∂Φ/∂q̇)ᵀ M⁻¹ ∂Φ/∂q̇. Here
     M = I + Δt² LᵀL, L the lower triangle of ones, and CᵀC besides with ``states``, C the derivative of X by q̇. So an
-    iterate equals the plain one preconditioned by M⁻¹: without ``states`` exactly but for rounding, with analytic
-    gradients and with differences (taken as Δt δ in the joint coordinates), with ``states`` but for the error of X. It
+    iterate equals the plain one preconditioned by M⁻¹: without ``states`` exactly up to rounding, with analytic
+    gradients and with differences (taken as Δt δ in the joint coordinates), with ``states`` up to the error of X. It
     equals the plain one itself only to the order Δt² HL², or ‖C‖²: M is nearly I because a state counts, in rad or m,
     as much as a velocity in rad/s. Differences of that size can change which way α goes, where two norms are nearly
     equal; the paths then separate for a while. Where Δt is 1 (``zhang3-helix``), M is far from I, and these are
@@ -140,7 +140,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
 
 @inner
 def factorise(dt, diagonal, ratio):
-    """L D Lᵀ of Δt² A Aᵀ of one joint, which has 1 + Δt², then 2 + Δt² on its diagonal and −1 beside it.
+    """L D Lᵀ of Δt² A Aᵀ of one joint, which has 1 + Δt², then 2 + Δt² on its diagonal and −1 next to it.
 
     ``diagonal`` receives D, ``ratio`` the entries of L below its diagonal of ones, the first of no use; (HL - 1,).
     """

@@ -1,6 +1,6 @@
 """Kernels of a horizon whose task coordinates are unknowns, with the kinematics as constraints (Varga 2021, eq. 3-4).
 
-The task coordinates X(i) stand here as their errors E(i) = X^N(i) − X(i); for ``pose``, whose coordinates cannot be
+The task coordinates X(i) are here their errors E(i) = X^N(i) − X(i); for ``pose``, whose coordinates cannot be
 changed one by one, as position error and rotation vector. The constraints of a stage are
 q(i+1) − q(i) − Δt q̇(i) = 0 and E(i+1) − ε(q(i+1)) = 0, where ε is the error that the kinematics give.
 """
@@ -56,7 +56,7 @@ class TaskSystem(NamedTuple):
 
 @inner
 def task_system(steps, e, n):
-    """A :class:`TaskSystem` of so many stages, components of the error and joints."""
+    """A :class:`TaskSystem` for numbers of stages, components of the error and joints."""
     s = steps * (n + e)
     return TaskSystem(np.empty((steps, e, n)), np.empty((s, s)), np.empty(s))
 

@@ -49,7 +49,7 @@ class ResolvedRate(CompiledPolicy, abc.ABC):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step, K Δt with the feedback gain K in [1/s].
+        gain: Fraction of the error corrected per step, K Δt with the feedback gain K in [1/s].
             Above 0; 1 is deadbeat control, 2 the limit of stability. Where commands take effect d steps late, the
             limit is 2 sin(π / (2 (2 d + 1))): 0.62 at 2 steps, 0.13 at 12.
 

@@ -49,7 +49,7 @@ class DampedLeastSquares(ResolvedRate):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         damping: λ, added to J Jᵀ as it is, not squared. In the square of the Jacobian's units, [m²] and [1]. Above 0.
 
     Raises:

@@ -102,7 +102,7 @@ class GramSchmidt(ResolvedRate):
     ρ u (u of unit length) asks for Δx_a; the contribution of the rows before is subtracted, and the rest,
     divided by ρ, is given along u. So Δq lies in the span of the rows and makes Δx: without truncation and with
     full rank it is the Moore–Penrose solution, although no sum of squares was minimised. (Orthonormalised columns
-    would make Δx too, but with joints that stand still.)
+    would make Δx too, but with joints at rest.)
 
     Rows whose remainder is too short are left out: their coordinates are not tracked, those kept are tracked
     exactly, unlike with the pseudoinverse, which spreads the error over all coordinates. The status then
@@ -111,7 +111,7 @@ class GramSchmidt(ResolvedRate):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         truncation: Rows whose remainder is shorter than this share of the longest row are left out. At least 0 and
             below 1. Rows of positions and of orientations are compared as they are, in [m] and [1].
 

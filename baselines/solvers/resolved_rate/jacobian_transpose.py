@@ -81,13 +81,13 @@ class JacobianTranspose(ResolvedRate):
     comes back through the measured error.
 
     Joint velocities are not bounded: where Δx lies along a direction that is nearly lost, with a singular value σ,
-    the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm stands still; the status then says
+    the step is Δx / σ like that of the pseudoinverse. Where JᵀΔx is 0 the arm rests; the status then says
     ``rank_deficient``, unless the task has more coordinates than the arm can move at once, where JᵀΔx is 0 at the
     best fit too.
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         rank_tolerance: ‖JᵀΔx‖ below this share of ‖J‖ ‖Δx‖ (Frobenius, weighed) counts as zero. At least 0.
         length: ℓ, the length that 1 rad, or 1 in a rotation matrix, counts as, in [m]. Above 0. If left out, chosen
             for the model, see :func:`baselines.solvers.arm_size.radian`.

@@ -68,7 +68,7 @@ class MoorePenrose(Pseudoinverse):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0, below 1.
 
     Raises:

@@ -120,13 +120,13 @@ class NullSpace(MoorePenrose):
 
     Args:
         problem: The scenario as the policy knows it.
-        gain: Share of the present error that is taken back in one step; see :class:`ResolvedRate`.
+        gain: Fraction of the error corrected per step; see :class:`ResolvedRate`.
         rank_tolerance: Singular values below this share of the largest count as zero. At least 0.
         objective: ``posture`` or ``joint_centring``. If left out, ``joint_centring`` where
             the model has joint limits and no posture is given, else ``posture``.
         secondary_gain: K in [1/s], at least 0 and below 2/Δt.
         posture: q_posture in [rad] or [m], 0 if left out; one number, or one a joint. For ``posture`` only.
-        damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 stands for Moore–Penrose.
+        damping: λ of the first part, as in :class:`DampedLeastSquares`; 0 for Moore–Penrose.
         influence: Distance from which on bodies are led away, in [m]. Above 0.
         repulsion: K of that in [1/s], at least 0 and below 2/Δt.
 

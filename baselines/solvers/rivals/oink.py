@@ -66,7 +66,7 @@ class Roboplan(TaskProgram):
                 task.setTargetConfiguration(target.start)
             acceleration.setLastVelocity(target.qdot)
             try:
-                # Made anew, since ProxQP goes on from its last step, and a policy depends on its observation alone.
+                # Made anew, since ProxQP continues from its last step, and a policy depends on its observation alone.
                 kinematics.Oink(scene, settings).solveIk(target.q, tasks, limits, barriers, moved, self.damping)
             except RuntimeError:
                 return None

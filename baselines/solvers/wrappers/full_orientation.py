@@ -1,4 +1,4 @@
-"""The whole orientation behind skew coordinates: their 90° ambiguity, resolved by how the motion goes on."""
+"""The whole orientation behind skew coordinates: their 90° ambiguity, resolved by the motion before and after."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def start_memory(rows: int) -> OrientationMemory:
 def resolve_orientation(problem: Problem, batch: Batch, memory: OrientationMemory) -> tuple[Batch, OrientationMemory]:
     """Whole poses for skew coordinates.
 
-    The skew part of a rotation by θ about a is sin θ · a: it is the same for θ and π − θ, and stands still at 90°,
-    where its Jacobian is singular although the arm is not. A solver that knows nothing else may go on there or turn
+    The skew part of a rotation by θ about a is sin θ · a: it is the same for θ and π − θ, and stationary at 90°,
+    where its Jacobian is singular although the arm is not. A solver that knows nothing else may continue there or turn
     back, and follows the right coordinates with the wrong orientation from there on. But a nominal motion has no
     reason to turn back just at 90°. So the sign of cos θ, which is all that is missing, is followed from step to step:
-    of the two orientations that coordinates allow, the nominal one is that whose cos θ goes on as it did. At the start
-    it is taken to be that of the arm, which the joint coordinates tell.
+    of the two orientations that coordinates allow, the nominal one is that whose cos θ continues its change. At the
+    start it is taken to be that of the arm, which the joint coordinates determine.
 
     Args:
         problem: With the task `skew`.
@@ -116,7 +116,7 @@ def resolve_one(coordinates, expected, frame):
     square = min(x * x + y * y + z * z, 1.0)
     cosine = math.copysign(math.sqrt(1.0 - square), expected)
     # (1 - cos θ) / sin² θ, the weight of the symmetric part, written so that small angles lose no digits. At 180° the
-    # coordinates vanish, and do not tell the axis.
+    # coordinates vanish, and do not determine the axis.
     weight = 1.0 / (1.0 + cosine) if cosine > 0.0 else (1.0 - cosine) / max(square, 1e-300)
     frame[0], frame[1], frame[2] = cosine + weight * x * x, weight * x * y - z, weight * x * z + y
     frame[3], frame[4], frame[5] = weight * x * y + z, cosine + weight * y * y, weight * y * z - x

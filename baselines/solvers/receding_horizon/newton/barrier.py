@@ -168,7 +168,7 @@ def _add_motion(problem, path, barrier, advance, workspace):
             place = bounded(barriers, k, e + 2 * n + j, reach, lower[j], upper[j], dt * limit, weight, mu, advance)
             first, twice = velocity_derivatives(cost, velocity)
             total += velocities[k] * velocity_cost(cost, velocity) + speed.value + turn.value + place.value
-            # The place reached, q + v |v| / (2 q̈_max), by the chain rule; its own curvature where it is convex.
+            # The place reached, q + v |v| / (2 q̈_max), by the chain rule; its curvature where it is convex.
             further = per * abs(velocity)
             own = max(math.copysign(per, velocity) * place.gradient, 0.0)
             by_velocity = (velocities[k] * first + speed.gradient + place.gradient * further) * rate

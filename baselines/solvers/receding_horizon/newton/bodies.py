@@ -55,7 +55,7 @@ class ClearanceWorkspace(NamedTuple):
         counts: How many pairs are near at each knot. Shape (K,).
         pairs: Which. Shape (K, c, 2).
         barriers: Their barriers, see :mod:`interior_point`. Shape (K, c, 1, 4).
-        before: The same of one knot before the last step. Shape (c, 4).
+        before: Likewise of one knot, before the last step. Shape (c, 4).
         between: Joint coordinates within a motion. Shape (n,).
     """
 

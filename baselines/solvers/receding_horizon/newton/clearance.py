@@ -1,7 +1,7 @@
 """Kernels: the clearance of a joint path, a limit of the interior point method like those of the joints.
 
 At each knot the signed distance d of every pair of bodies that is near must not fall below a margin. This is a limit
-u <= 0 with u = (margin - d) / SCALE, and stands in the barrier function as φ(u), see :mod:`terms`; its curvature along
+u <= 0 with u = (margin - d) / SCALE, and is φ(u) in the barrier function, see :mod:`terms`; its curvature along
 the gradient of d is that of φ, and the curvature of d itself is left out (Gauss–Newton). Pairs come and go as the path
 changes: the part of φ that a pair has at the influence distance, with its slope and its curvature there, is taken off,
 so that no pair makes a jump.
@@ -36,13 +36,13 @@ NEW = -1.0
 
 @inlined
 def boxes_at(clearance, step):
-    """The row of the obstacles that holds so many steps from now."""
+    """The row of the obstacles a number of steps from now."""
     return min(step, clearance.boxes.shape[0] - 1)
 
 
 @uncounted
 def find_pairs(clearance, chain, q, step, work):
-    """The pairs that are near at a configuration so many steps from now, which the workspace receives; how many."""
+    """The pairs that are near at a configuration some steps from now, which the workspace receives; how many."""
     place(chain, clearance.shapes, q, work.joints, work.placed)
     near, boxes = (work.distances, work.found, work.vectors), clearance.boxes[boxes_at(clearance, step)]
     return nearest(clearance.shapes, boxes, clearance.checked, work.placed, work.core, clearance.influence, near)
@@ -50,7 +50,7 @@ def find_pairs(clearance, chain, q, step, work):
 
 @uncounted
 def least_clearance(clearance, chain, q, step, work):
-    """The smallest signed distance at a configuration so many steps from now, in [m]."""
+    """The smallest signed distance at a configuration some steps from now, in [m]."""
     place(chain, clearance.shapes, q, work.joints, work.placed)
     boxes = clearance.boxes[boxes_at(clearance, step)]
     return smallest(clearance.shapes, boxes, clearance.checked, work.placed, work.core, work.found[0])
@@ -127,7 +127,7 @@ def _take_over(work, k, count, advance):
 
 @uncounted
 def clearance_left(clearance, work, knots, slack):
-    """Whether a pair at one of so many knots is nearer than the margin by more than a share of its scale."""
+    """Whether a pair at one of K knots is nearer than the margin by more than a share of its scale."""
     if clearance is None:
         return False
     for k in range(knots):

@@ -1,7 +1,7 @@
-"""Kernels: the cost of a joint path, the merit function that stands for it, and its quadratic model.
+"""Kernels: the cost of a joint path, the merit function in its place, and its quadratic model.
 
-The tracking cost of a knot depends on its own joint coordinates alone, the velocity cost of a block on those of its two
-ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks beside the diagonal. Changes of velocity,
+The tracking cost of a knot depends on its joint coordinates alone, the velocity cost of a block on those of its two
+ends, joint by joint: the Hessian is block-tridiagonal, with diagonal blocks next to the diagonal. Changes of velocity,
 where they cost something, couple three knots: see :func:`change`.
 """
 

@@ -19,8 +19,8 @@ class Grid(NamedTuple):
     Attributes:
         at: Steps from now to each knot, at least 1 and rising. Shape (K,).
         length: Steps of the block that ends in the knot. Shape (K,).
-        tracking: How many stage costs of tracking the knot stands for. Shape (K,).
-        velocity: How many stage costs of velocity the block stands for. Shape (K,).
+        tracking: Number of tracking stage costs that the knot represents. Shape (K,).
+        velocity: Number of velocity stage costs that the block represents. Shape (K,).
     """
 
     at: Integers
@@ -115,7 +115,7 @@ def cut(at, steps, terminal, grid):
 
 @expanded
 def first_knots(grid, knots):
-    """The first so many knots of a grid."""
+    """The first knots of a grid."""
     return Grid(grid.at[:knots], grid.length[:knots], grid.tracking[:knots], grid.velocity[:knots])
 
 

@@ -36,12 +36,12 @@ FIRST_MU, LIMIT_WEIGHT, LEAST_UNIT = 0.1, 100.0, 1e-2
 EXCESS_MU, LARGEST_MU = 1.0, 100.0
 # μ falls by the first factor, and later to its power (Wächter and Biegler 2006, eq. 7), down to a share of the cost.
 FALL, POWER, LEAST_MU = 0.2, 1.25, 1e-11
-# μ falls where less than so many μ are left to gain, or this share of the barrier function, which is rounding.
+# μ falls where less than this multiple of μ is left to gain, or this share of the barrier function, which is rounding.
 NEAR, ROUNDING = 1.0, 1e-13
 # The finest relative precision of the cost: below it the slacks of active limits are rounding.
 FINEST = 1e-9
-# w of the limits grows where one is left by more than this share of its scale, and by more than so many μ / w, which is
-# the effect of μ alone: its multiplier would be above w. Where that does not help no path keeps them.
+# w of the limits grows where one is left by more than this share of its scale, and by more than this multiple of
+# μ / w, which is the effect of μ alone: its multiplier would be above w. Where that does not help no path keeps them.
 LEFT, BY_MU, GROWTH, LARGEST_GROWTH = 1e-6, 10.0, 10.0, 1e3
 # Lengths of a step tried one after the other.
 SHORTENING, TRIALS = 0.5, 16
@@ -123,7 +123,7 @@ def minimise_path(problem, path, multipliers, settings, smoothing, workspace):
 
 @uncounted
 def limits_left(workspace, knots, slack):
-    """Whether the path of so many knots leaves a limit by more than a share of its scale."""
+    """Whether the path of K knots leaves a limit by more than a share of its scale."""
     barriers, e = workspace.barriers, workspace.knot.error.shape[0]
     for k in range(knots):
         for i in range(e, barriers.shape[1]):

@@ -40,7 +40,7 @@ def newton_step(model, exact, damping, inverse, factor, step):
 
 @inlined
 def _eliminate(coupling, inverse, rhs_before, pivot, rhs):
-    """Eliminates the knot before, by the diagonal (n,) of the block beside the pivot.
+    """Eliminates the knot before, by the diagonal (n,) of the block next to the pivot.
 
     Its Schur complement is taken from the pivot, whose lower triangle counts, its share from the right-hand side.
     """
@@ -82,7 +82,7 @@ def multiply(matrix, scratch, vector):
 def pentadiagonal_step(model, exact, damping, inverse, factor, step):
     """:func:`newton_step` where ``model.far`` is not zero.
 
-    The blocks two away from the diagonal are diagonal and stay so; those beside it fill up on the way.
+    The blocks two away from the diagonal are diagonal and stay so; those next to it fill up on the way.
     """
     knots, n = step.shape
     far, beside = model.far, model.beside
@@ -109,7 +109,7 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
 
 @inlined
 def _fill(model, inverse, k):
-    """The block beside the diagonal in row ``k``, behind the elimination of the knot two before."""
+    """The block next to the diagonal in row ``k``, behind the elimination of the knot two before."""
     far, beside = model.far, model.beside
     n = far.shape[1]
     for a in range(n):

@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 
 # Newton steps of each of several initial guesses, and how exactly they are minimised before they are compared.
 STEPS_OF_A_START, TOLERANCE_OF_A_START = 30, 1e-4
-# A restart candidate that is still so many times more costly than the plan after so many Newton steps is given up.
+# A restart candidate is given up if its cost exceeds this multiple of the plan's after this number of Newton steps.
 HOPELESS, TRIED = 10.0, 5
 # Likewise after `start_steps` of them, where initial guesses are tried one after the other as candidates.
 UNPROMISING = 2.0
@@ -82,7 +82,7 @@ def plan_in(block, knots, n):
 
 @expanded
 def first_part(plan, knots):
-    """The first so many knots of a plan, as views."""
+    """The first knots of a plan, as views."""
     return Plan(plan.path[:knots], plan.multipliers[:knots])
 
 

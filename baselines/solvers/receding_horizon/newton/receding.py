@@ -39,7 +39,7 @@ KEPT = 1e-5
 STEPS_OF_THE_FIRST, STEPS_TO_THE_OPTIMUM = 30, 300
 # Periods that share the Newton steps of the initial plan where guesses are spread over periods, and those of the first.
 PERIODS_OF_THE_FIRST, SHARE_OF_THE_FIRST = 2, 0.4
-# Behind so many periods beyond the velocity limits another plan is begun beside it.
+# Number of periods beyond the velocity limits after which another plan is begun.
 RETRY = 4
 
 
@@ -49,7 +49,7 @@ class HorizonMemory(NamedTuple):
     Attributes:
         plans: The plan and, where there is one, the restart candidate, see :func:`plan.plan_in`: joint coordinates at
             the K knots in [rad] or [m], then e + 2 n multipliers a knot. Shape (B, 1 or 2, K (e + 3 n)).
-        counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had (a guess that has a period of its own
+        counts: PERIODS planned so far, CANDIDATE_STEPS that the candidate has had (a guess that has a whole period
             counts as one), initial guesses TRIED so far, and how many periods in a row have ended FAR beyond the
             velocity limits. Shape (B, 4).
         q: Joint coordinates of the period before, in [rad] or [m]. Shape (B, n).
@@ -148,7 +148,7 @@ def _grids(settings, remaining, workspace):
 
 @uncounted
 def _plan_row(problem, settings, old_grid, plans, counts, workspace):
-    """Plans a period of one arm, and goes on with its restart candidate.
+    """Plans a period of one arm, and improves its restart candidate.
 
     The plans (1 or 2, K (e + 3 n)) and counts (4,) of :class:`HorizonMemory` are changed in place.
 
@@ -195,7 +195,7 @@ def _newton_steps(settings, first, hurried):
 
 @uncounted
 def _restart(problem, settings, old_grid, plans, counts, cost, starting, workspace):
-    """Begins a restart candidate, or goes on with the one there is; gives the Newton steps made.
+    """Begins a restart candidate, or improves the present one; gives the Newton steps made.
 
     Args:
         problem: A :class:`PathProblem`.

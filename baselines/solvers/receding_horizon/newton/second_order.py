@@ -85,5 +85,5 @@ def rotation_gradient(kind, gradient, i, j):
         return -gradient[3 * i + j]
     if i == j:
         return 0.0
-    # O^A_12, O^A_13, O^A_23 stand at 0, 1, 2.
+    # O^A_12, O^A_13, O^A_23 are at 0, 1, 2.
     return -0.5 * gradient[i + j - 1] if i < j else 0.5 * gradient[i + j - 1]

@@ -1,17 +1,17 @@
-"""Kernels: the smooth terms that stand for kinks and limits of the cost, one component at a time.
+"""Kernels: the smooth terms in place of kinks and limits of the cost, one component at a time.
 
 The cost has kinks: beyond |e| = Δx the derivative of Φ^X jumps from 2 to P_X. A minimum often lies right on such a
 kink, where no gradient vanishes. There are two ways to make it smooth.
 
 **Augmented Lagrangian.** The part beyond the kink, max(0, |x| - 1), is the largest of λ x - |λ| over |λ| <= 1. Held
 near the λ known from the step before, which is the method of multipliers, it is smooth, and Newton's method finds the
-minimum exactly. A joint limit is the same with a λ without bound.
+minimum exactly. A joint limit has a λ without bound.
 
 **Barrier.** A kink of the cost is w max(0, u), and a limit u <= 0 the same with a w above its multiplier (an exact
 penalty, so that no path is infeasible). Both are the least w t over t >= 0 and t >= u, and with a logarithmic barrier
 for these two conditions a smooth function of u: φ(u) = min_t w t - μ log t - μ log (t - u), which tends to w max(0, u)
 with μ. Newton's method with the exact φ'' goes wrong from far; the curvature is taken from the primal-dual equations λ
-(t - u) = μ and (w - λ) t = μ with a multiplier λ of its own (Nocedal and Wright, *Numerical optimization*, 2006,
+(t - u) = μ and (w - λ) t = μ with a separate multiplier λ (Nocedal and Wright, *Numerical optimization*, 2006,
 section 19.3).
 """
 
@@ -254,7 +254,7 @@ class Bounded(NamedTuple):
 
 @inlined
 def one_side(barriers, k, i, side, u, weight, mu, advance):
-    """One bound; gives a :class:`Bounded`. λ goes on by the primal-dual equations of this step."""
+    """One bound; gives a :class:`Bounded`. λ follows from the primal-dual equations of this step."""
     here = smoothed(u, weight, mu)
     multiplier = here.gradient
     if advance >= 0.0:
