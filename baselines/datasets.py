@@ -18,12 +18,12 @@ from minari.dataset.minari_dataset import parse_dataset_id
 from minari.dataset.minari_storage import MinariStorage
 from tqdm import tqdm
 
+from baselines.episodes import add_up
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.policies import AnyPolicy
 from baselines.files import ResultsError, locked
 from baselines.fingerprints import fingerprint
-from baselines.recording import add_up
 from ikgym import scenarios
 from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import InvalidInputError

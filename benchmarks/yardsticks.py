@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 import baselines
-from baselines.episodes import rollout, rollouts
-from baselines.recording import Episode
+from baselines.episodes import Episode, rollout, rollouts
 from baselines.spec import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import EPISODES, FILE

@@ -17,8 +17,7 @@ import numpy as np
 
 import ikgym
 from baselines import registry
-from baselines.episodes import rollouts
-from baselines.recording import add_up
+from baselines.episodes import add_up, rollouts
 from baselines.tuning import search
 from baselines.tuning.ranges import Range
 from docs.keeping import WORK, Line

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.episodes import Episode, Seeds
 from baselines.evaluation.motion.spline import smooth, stop
 from baselines.files import csv_text, json_text
-from baselines.recording import Episode, Seeds
 from ikgym.arms import Arm
 from ikgym.exceptions import MissingDependencyError
 from ikgym.scenarios import Scenario

@@ -10,9 +10,8 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Simulation
+from baselines.episodes import Seeds, Simulation
 from baselines.policy import Report
-from baselines.recording import Seeds
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.simulation import Outcome

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from baselines.canonical import canonical
+from baselines.episodes import Seeds
 from baselines.evaluation import test_sets
 from baselines.evaluation.metrics import Key, Skipped
 from baselines.evaluation.policies import (
@@ -27,7 +28,6 @@ from baselines.files import ResultsError
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
 from baselines.policy.protocol import Policy
-from baselines.recording import Seeds
 from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.recording import Episode, Seeds
+from baselines.episodes import Episode, Seeds
 from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray

@@ -16,7 +16,7 @@ import numpy as np
 
 import ikgym
 from baselines.canonical import canonical
-from baselines.recording import Episode, Seeds, add_up
+from baselines.episodes import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits

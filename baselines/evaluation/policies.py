@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast
 
 from baselines import registry
 from baselines.canonical import jsonable
+from baselines.episodes import Seeds
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
 from baselines.policy.protocol import Policy
-from baselines.recording import Seeds
 from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.registry import import_object

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.canonical import canonical
+from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
 from baselines.evaluation.log import USUAL, trajectory_log
@@ -32,7 +33,6 @@ from baselines.files import (
     write,
     write_json,
 )
-from baselines.recording import Episode
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest

@@ -16,7 +16,7 @@ from tqdm.contrib.logging import logging_redirect_tqdm
 
 import ikgym
 from baselines.canonical import canonical, jsonable
-from baselines.episodes import Tick, rollouts
+from baselines.episodes import Episode, Tick, rollouts
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import Row, Rows, Skipped, describe, measure
 from baselines.evaluation.policies import ALL, AnyPolicy, check_picklable
@@ -25,7 +25,6 @@ from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.oracle.stripped import ideal
 from baselines.policy import SolverPolicy
-from baselines.recording import Episode
 from baselines.workers import WorkerError, Workers, finished
 from ikgym.exceptions import printable
 from ikgym.kernels.compilation import logger

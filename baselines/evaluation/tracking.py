@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from baselines.episodes import Episode, Seeds, add_up
 from baselines.evaluation.export import Motion, by_joint, joint_trajectory, mcap, table
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.jobs import job_of
@@ -20,7 +21,6 @@ from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy
 from baselines.evaluation.run import play
 from baselines.files import write
-from baselines.recording import Episode, Seeds, add_up
 from baselines.status import Status
 from ikgym import scenarios
 from ikgym.scenarios import Preview, Scenario

@@ -8,11 +8,10 @@ from typing import Self
 import numpy as np
 from gymnasium.utils import seeding
 
-from baselines.episodes import Simulation, rollouts
+from baselines.episodes import Simulation, add_up, rollouts
 from baselines.policy import Problem, SolverPolicy
 from baselines.policy.surroundings import sweep_bodies
 from baselines.policy_kernels import Model
-from baselines.recording import add_up
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem

@@ -9,13 +9,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 from baselines import registry
+from baselines.episodes import Seeds
 from baselines.oracle.best_known import MEANINGLESS
 from baselines.oracle.cache import keep, kept, solve
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.stripped import stripped
 from baselines.policy import SolverPolicy
-from baselines.recording import Seeds
 from baselines.spec import parse_policy
 from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from baselines.recording import Episode
+from baselines.episodes import Episode
 from ikgym.validation import FloatArray
 
 #: "More", "smaller", "degraded": a difference of a tenth of the larger value. "Significantly", "considerably": a factor

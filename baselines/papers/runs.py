@@ -8,9 +8,8 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from baselines.canonical import canonical, jsonable
-from baselines.episodes import rollout
+from baselines.episodes import Episode, rollout
 from baselines.fingerprints import episode_hash
-from baselines.recording import Episode
 from baselines.registry import make
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError

@@ -18,10 +18,9 @@ from optuna.trial import Trial, TrialState
 
 from baselines import registry
 from baselines.canonical import DIGITS, canonical, round_digits
-from baselines.episodes import rollouts
+from baselines.episodes import add_up, rollouts
 from baselines.files import check_flags, check_same, read_bytes, reading
 from baselines.fingerprints import fingerprint
-from baselines.recording import add_up
 from baselines.spec import parse_policy
 from baselines.tuning.ranges import RANGES, Range, nest, ranges_of, read_ranges, suggest
 from baselines.workers import Workers, finished

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.controller import Controller, Drives, Guards
+from baselines.episodes import Seeds
 from baselines.evaluation.policies import specification
 from baselines.policy import SolverPolicy
-from baselines.recording import Seeds
 from baselines.status import Status
 from baselines.viewer.replay import Stage
 from ikgym.exceptions import InvalidInputError

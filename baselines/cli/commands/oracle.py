@@ -12,13 +12,13 @@ from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.cli.parsing import Rule
+from baselines.episodes import Seeds
 from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.cache import VARIABLE
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.several import Wanted, check_policies, find_all
 from baselines.oracle.stripped import NOTE, strips
-from baselines.recording import Seeds
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.episodes import Tick, rollouts
+from baselines.episodes import Episode, Seeds, Tick, rollouts
 from baselines.policy.protocol import Policy
-from baselines.recording import Episode, Seeds
 from ikgym.kernels.simulation import nominal_rows
 from ikgym.kernels.tasks import AXIS, POSE
 from ikgym.scenarios import Preview, Scenario

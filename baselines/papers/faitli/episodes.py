@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from baselines.episodes import Episode
 from baselines.papers.comparisons import sign_changes
 from baselines.papers.runs import Runs, nominal_joints
-from baselines.recording import Episode
 from baselines.solvers.arm_size import jacobian_bound
 from ikgym.arms import Arm
 from ikgym.scenarios import Scenario

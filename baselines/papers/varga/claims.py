@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.episodes import Episode
 from baselines.papers.comparisons import CONSIDERABLY, above, larger, largest_error, peak_speed, rms
 from baselines.papers.paper import Figures, Finding, scaled
 from baselines.papers.runs import Runs, nominal_joints
@@ -31,7 +32,6 @@ from baselines.papers.varga.episodes import (
     without_start,
 )
 from baselines.papers.varga.interpreted import descend
-from baselines.recording import Episode
 from ikgym.validation import FloatArray
 
 

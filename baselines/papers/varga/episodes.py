@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from baselines.episodes import Episode
 from baselines.papers.comparisons import roughness
 from baselines.papers.runs import Runs
-from baselines.recording import Episode
 from baselines.registry import make
 from baselines.status import Status
 from ikgym import RedundantIKEnv

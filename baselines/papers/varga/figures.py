@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.lib.stride_tricks import sliding_window_view
 
+from baselines.episodes import Episode
 from baselines.papers.drawing import Curve, Panel, compared, picture
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs, nominal_joints, times
 from baselines.papers.varga.episodes import FAST, METHOD, SLOW, fast, slow, smooth
-from baselines.recording import Episode
 from ikgym.validation import FloatArray
 
 WINDOW = 150  # steps of a close-up

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.episodes import Episode
 from baselines.papers.runs import Runs
 from baselines.policy import Batch, SolverPolicy
-from baselines.recording import Episode
 from baselines.registry import make
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.solvers.levenberg_marquardt.iteration import DampingMemory

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from baselines.episodes import Episode
 from baselines.papers.comparisons import SAME, below, extent, falls, larger, roughness
 from baselines.papers.paper import Finding, scaled
 from baselines.papers.runs import Runs
@@ -28,7 +29,6 @@ from baselines.papers.zhang.episodes import (
     settled_from,
     unmet_of_the_way,
 )
-from baselines.recording import Episode
 from baselines.solvers.levenberg_marquardt.damping import typical_link
 from baselines.status import Status
 from ikgym.kernels.rotations import rodrigues

@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
+from baselines.episodes import Seeds, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thin
@@ -18,7 +18,6 @@ from baselines.evaluation.rankings import ranking
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import markdown
-from baselines.recording import Seeds
 from ikgym.obstacles.solids import closest
 from tests.baselines.evaluation.html.test_series import decoded
 from tests.bodied import blocked, crowd

@@ -8,6 +8,7 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.episodes import Seeds, add_up
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.motion.free_timing import reference_at
@@ -15,7 +16,6 @@ from baselines.evaluation.motion.spline import FEWEST
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import COLUMNS, summarise
 from baselines.evaluation.table import records
-from baselines.recording import Seeds, add_up
 from tests.baselines.solvers.quadratic_program.paths import circle
 
 

@@ -9,14 +9,13 @@ from numpy.testing import assert_allclose
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
+from baselines.episodes import Episode, Seeds, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation.html.series import ACCELERATION, VELOCITY, limits
 from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import TIME_COLUMNS, Row, is_followed, lost, measure
 from baselines.evaluation.summary import summarise
 from baselines.files import from_json
-from baselines.recording import Episode, Seeds
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
 from tests.limited import limited

@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
+from baselines.episodes import Seeds, rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report, run
 from baselines.evaluation.log import trajectory_log
@@ -18,7 +18,6 @@ from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import number
 from baselines.files import ResultsError
-from baselines.recording import Seeds
 from tests.baselines.making import circle
 
 BASE = Row(

@@ -8,11 +8,10 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout, rollouts
+from baselines.episodes import Seeds, rollout, rollouts
 from baselines.evaluate import evaluate
 from baselines.evaluation.run import batches, play
 from baselines.policy import Solution, SolverPolicy, statuses
-from baselines.recording import Seeds
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.evaluation.planning import planned

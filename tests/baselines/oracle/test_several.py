@@ -4,10 +4,10 @@ import dataclasses
 
 import pytest
 
+from baselines.episodes import Seeds
 from baselines.oracle import Search, several
 from baselines.oracle.cache import kept
 from baselines.oracle.several import Wanted, find_all
-from baselines.recording import Seeds
 from baselines.workers import WorkerError, Workers
 from ikgym import scenarios
 from tests.baselines.losing import LosingCluster

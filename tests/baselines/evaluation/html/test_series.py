@@ -5,10 +5,9 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
+from baselines.episodes import Seeds, rollout
 from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thin
 from baselines.evaluation.log import FRAMES, frame_rows, trajectory_log
-from baselines.recording import Seeds
 from tests.limited import limited
 
 

@@ -5,9 +5,8 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import rollout
+from baselines.episodes import Seeds, rollout
 from baselines.oracle.stripped import stripped
-from baselines.recording import Seeds
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 
