@@ -32,7 +32,7 @@ KNOWN = 1.0
 #: Steps over which white noise of q is distinguished from errors of the drives, and samples of the running variances.
 SPAN, SAMPLES = 32, 500.0
 #: By how many steps the slowest joint may be later than the model is ahead, and earlier; together above 1.
-LATER, EARLIER = 0.25, 0.9
+LATER, EARLIER = 0.25, 0.98
 # Sums over time: of squares, and of products with the residual of the next lag, of the next delay, and of both, which
 # has two.
 ALONE, NEXT_LAG, NEXT_DELAY, CROSSED = range(4)
