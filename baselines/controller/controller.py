@@ -296,12 +296,23 @@ class Controller:
                 raise InvalidInputError(
                     f"warm_up: expected a policy that follows the reference of scenario {scenario.name!r} within the "
                     f"guards, but {self.policy.name} is stopped in period {k + 1}: {self._stopped.label}."
+                    f"{self._advice(start, nominal[1]) if k == 0 else ''}"
                 )
             q, k = q + scenario.dt * qdot, k + 1
             if k == scenario.steps or self._stopped is not None:
                 self.reset()
                 q, k = start, 0
         return spent[1:]
+
+    def _advice(self, start: FloatArray, nominal: FloatArray) -> str:
+        """How to begin a motion whose reference is farther from the arm than the guards allow."""
+        if self._stopped is not StopReason.PATH_ERROR:
+            return ""
+        distance, angle = kernels.errors(self._kind, nominal, self._seen(None, start))
+        return (
+            f" The arm starts {distance:.3g} m and {angle:.3g} rad from the reference: begin on it, or allow more with "
+            "guards=Guards(position_error=…, orientation_error=…)."
+        )
 
     def _touch(self) -> None:
         """Compiles kernels that the first periods may not call: poses as rotation and position, and a stop."""

@@ -65,12 +65,12 @@ def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, 
     kept[MEASURED] = q
     if not same:
         kept[TRAVEL] = 0.0
-    distance, angle = _errors(kind, nominal[0], pose)
+    distance, angle = errors(kind, nominal[0], pose)
     return 0 if distance <= numbers[POSITION] and angle <= numbers[ORIENTATION] else PATH_ERROR
 
 
 @kernel
-def _errors(kind, nominal, pose):
+def errors(kind, nominal, pose):
     """Distance in [m] and angle in [rad] of a pose from the reference."""
     m = pose.shape[0]
     error = np.empty(tasks.error_size(kind, m))

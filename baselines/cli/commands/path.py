@@ -12,6 +12,7 @@ import tyro
 
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, describe_bodies, look_at, scenario_of
+from baselines.controller.guards import Guards
 from baselines.files import check_writable_file
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.motion import OTHERS, PREFERRED
@@ -27,7 +28,7 @@ from ikgym.validation import BoolArray, Bounds, FloatArray, known_names, whole_n
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
-#: With 0.1 the control loop keeps its path on late drives, with 0 it loses it; see docs/real-arm.md.
+#: The control loop loses four of seven retimed paths with a lag of 20 ms and 2 periods of 4 ms, without a reserve all.
 RESERVE = 0.15
 
 
@@ -204,6 +205,21 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
     lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]
     if driven.solver != PREFERRED:
         lines.append(f"Play it with {driven.solver}: evaluate --policies, Controller(…, {driven.solver!r}).")
+    return [*lines, *_warnings(found, driven)]
+
+
+def _warnings(found: Survey, driven: Retimed) -> list[str]:
+    """Why a control loop may stop the motion on drives that lag."""
+    arm, lines = driven.scenario.arm, []
+    excess = np.where(_find_unstated(arm), _peaks(driven) / Guards().acceleration(arm), 0.0)
+    joint = int(np.argmax(excess))
+    if excess[joint] > 1.0:
+        allowed = f"{Guards().acceleration(arm)[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
+        lines.append(f"Controller allows {allowed}, and may lose the path: state limits with --acceleration.")
+    if driven.duration != found.duration:
+        lines.append(
+            "On drives that lag, Controller may stop at these speeds (PATH_ERROR): begin with a slower motion."
+        )
     return lines
 
 
@@ -245,11 +261,17 @@ def _find_unstated(arm: Arm) -> BoolArray:
 
 def _peak(driven: Retimed) -> str:
     """The largest acceleration of a joint without a limit."""
-    arm, motion = driven.scenario.arm, driven.motion
-    steps = np.diff(motion.q[:, 0], axis=0, prepend=motion.q[:1, 0])  # from rest
-    peaks = np.abs(np.diff(steps, axis=0)).max(axis=0) / motion.times[1] ** 2
+    arm, peaks = driven.scenario.arm, _peaks(driven)
     joint = int(np.argmax(np.where(_find_unstated(arm), peaks, 0.0)))
     return f"accelerations come to {peaks[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
+
+
+def _peaks(driven: Retimed) -> FloatArray:
+    """The largest accelerations in [rad/s²] or [m/s²]. Shape (n,)."""
+    motion = driven.motion
+    steps = np.diff(motion.q[:, 0], axis=0, prepend=motion.q[:1, 0])  # from rest
+    peaks: FloatArray = np.abs(np.diff(steps, axis=0)).max(axis=0) / motion.times[1] ** 2
+    return peaks
 
 
 main = shell.Command("path", Options, manual, _work, RULES)

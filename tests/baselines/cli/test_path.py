@@ -57,6 +57,13 @@ def test_arms_that_are_not_in_the_catalogue(robot, capsys):
     np.testing.assert_allclose(tracking.nominal[-1], scenario.nominal()[-1])
 
 
+@pytest.mark.slow
+def test_accelerations_that_the_control_loop_does_not_allow_are_named(capsys):
+    """Without stated limits, also where the motion is not retimed: its sibling has limits, and no such line."""
+    assert main(["path", "iiwa14-fast"]) == 0
+    assert re.search(r"Controller allows \d+\.\d+ rad/s² at joint_a\d, and may lose the path", capsys.readouterr().out)
+
+
 def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkeypatch):
     known, survey = [], path.survey
     monkeypatch.setattr(
@@ -68,6 +75,8 @@ def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkey
     assert main([*words, "2"]) == 0
     text = capsys.readouterr().out
     assert "It cannot be driven in 0.358 s, but in " in text
+    assert "PATH_ERROR" in text
+    assert "Controller allows" not in text
     assert "% panda_joint" in text
     scenario, lines = ikgym.scenarios.load("slow.toml"), text.splitlines()
     assert f"slow.toml: {scenario.steps} steps of 0.02 s" in text
