@@ -195,7 +195,7 @@ class Simulation:
             np.ones(len(seeds), dtype=np.bool_),
             [seeding.np_random(one.seed)[0] for one in drawn],
             noise_seeds=[one.noise_seed for one in drawn],
-            **self._simulator.checked({"arm_seed": [one.arm_seed for one in drawn]}),
+            **self._simulator.check_options({"arm_seed": [one.arm_seed for one in drawn]}),
         )
         self._outcome = self._simulator.observe()
 

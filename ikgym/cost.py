@@ -113,7 +113,7 @@ class ProximityCost(Frozen):
     count as bodies that touch.
 
     It is a part of the score. Solvers do not know it: those that minimise a stage cost, such as `rhc`, minimise Φ^X +
-    Φ^U, and keep their own distance from bodies. There is no best known cost with it.
+    Φ^U, and keep a distance of their choice from bodies. There is no best known cost with it.
 
     Args:
         clearance: The distance below which it costs anything, in [m]. From 1e-12 to 1e12.

@@ -90,7 +90,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     |---|---|---|
     | joint velocity as a fraction of the scenario's `velocity_limit` | `Box(-1.0, 1.0, (n,), float32)` | 1 |
 
-    `velocity_limit` is in [rad/s], in [m/s] for a prismatic joint: the arm's own, unless the scenario says otherwise.
+    `velocity_limit` is in [rad/s], in [m/s] for a prismatic joint: that of the arm, unless the scenario says otherwise.
     An action outside the box is clipped, and `info["clipped"]` says so. An action that is not finite or of a wrong
     shape is an error; the state stays as it was.
 
@@ -106,8 +106,8 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
        some.
     5. A joint that would pass a limit of its coordinate stops there, whatever the acceleration limit says. Its q̇ is
        (q(k+1) − q(k)) / Δt then, no faster than the velocity limit: 0 where it stood at the stop already.
-    6. Where the scenario has collisions, a motion in which bodies touch is not made: the arm stands still for the rest
-       of the episode (protective stop). The path goes on, and costs.
+    6. Where the scenario has collisions, a motion in which bodies touch is not made: the arm is stopped for the rest
+       of the episode (protective stop). The path continues, and costs.
 
     An ideal plant without limits applies the command. `info["at_limit"]` counts the joints that were held back, by
     more than a millionth of the scenario's `velocity_limit`, which exceeds the rounding of float32.
@@ -132,7 +132,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     limits use it in the first step of an episode alone, and then the last command, which they remember.
     `preview` = an int p gives X^N(k+1) … X^N(k+p); a tuple such as (1, 10, 40, 120) gives only those steps.
     A row of `obstacles` has a rotation, row by row, a position, half of the edges and a radius, see
-    :class:`ikgym.kernels.bodies.Surroundings`. The nominal goes on past the end of the episode. All bounds are finite
+    :class:`ikgym.kernels.bodies.Surroundings`. The nominal continues past the end of the episode. All bounds are finite
     and true: they follow from the start, the limits, the number of steps and the arm's reach.
 
     ## Reward
@@ -153,10 +153,10 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     | `time` | time since the start | [s] |
 
     Where the scenario has collisions, `clearance` is the smallest signed distance between bodies in [m], and
-    `collision` is true for an arm that stands still since bodies touched. Where it has a `ProximityCost`,
+    `collision` is true for an arm that was stopped since bodies touched. Where it has a `ProximityCost`,
     `proximity_cost` is that of the clearance, Φ^C.
 
-    After a reset `info` is empty, but for `context`, float64 (c,), where the plant draws numbers from ranges, see
+    After a reset `info` is empty, except for `context`, float64 (c,), where the plant draws numbers from ranges, see
     :class:`ikgym.Plant`: -1 at the lower end of a range, 1 at the upper end. No policy of the benchmark sees it.
 
     ## Starting state
@@ -166,7 +166,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     - `{"arm_seed": k}` uses the arm and the drives that k draws, for this episode, whatever the seed; it is an error
       where the plant draws neither.
     - `{"q": …}` starts elsewhere, within the limits of the arm. A joint without limits starts at most 2π [rad] or [m]
-      from home (or as far as the scenario's own start, if that is farther).
+      from home (or as far as the start of the scenario, if that is farther).
     - `{"step": k}` enters the episode after k steps, on its reference joint path and at its velocity; with `q`, at that
       posture and at rest. Sensor and drive histories are initialised as if the arm had been there before. It is an
       error where the reference is a path of the tool alone.
@@ -186,7 +186,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
     Raises:
         UnknownNameError: There is no such scenario.
         InvalidInputError: The scenario, the preview, the number of commands, the distance or the render mode is not
-            valid, or there is no memory for so many steps.
+            valid, or there is no memory for the steps.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # type: ignore[misc]
@@ -203,8 +203,8 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
             raise InvalidInputError(
                 f"render_mode: expected None or one of {self.metadata['render_modes']}, got {render_mode!r}."
             )
-        own = self._set_arms(scenario, None, preview, commands, lost_distance, render_mode)
-        self.observation_space, self.action_space = own
+        one = self._set_arms(scenario, None, preview, commands, lost_distance, render_mode)
+        self.observation_space, self.action_space = one
         self._step, self._ended = -1, True  # no episode yet
         self._steps, self._dt = self.scenario.steps, self.scenario.dt
         self._has_orientation = self.scenario.task.has_orientation
@@ -240,7 +240,7 @@ class RedundantIKEnv(Arms, gym.Env[Any, Any]):
                 limits; the seed of the arm is none, or the plant draws no arm; there is no such step or joint path.
         """
         options = checked_options(options, OPTIONS)
-        chosen = self._simulator.checked(options)
+        chosen = self._simulator.check_options(options)
         super().reset(seed=seed)
         self._simulator.reset(np.ones(1, dtype=np.bool_), [self.np_random], **chosen)
         self._ended = True  # until it is certain that the arm touches nothing

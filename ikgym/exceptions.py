@@ -28,7 +28,7 @@ def printable(text: str, kept: str = "") -> str:
     return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
-def listed(names: Sequence[str]) -> str:
+def list_names(names: Sequence[str]) -> str:
     """Names for a message; of a great many, the first ones."""
     if len(names) <= MANY:
         return ", ".join(names)
@@ -42,7 +42,7 @@ class UnknownNameError(IkgymError, LookupError):
         self.kind, self.name, self.available = kind, name, tuple(available)
         near = _nearest(name, self.available) if isinstance(name, str) else ()
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        listing = listed(self.available) or "none"
+        listing = list_names(self.available) or "none"
         shown = " ".join(repr(name).split())  # arrays take several lines
         shown = shown if len(shown) <= SHOWN else f"{shown[: SHOWN - 1]}…"
         super().__init__(f"There is no {kind} {shown}.{hint} Available: {listing}.")

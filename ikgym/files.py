@@ -38,7 +38,7 @@ def draft_of(file: pathlib.Path) -> pathlib.Path:
 
 
 def read_user_file(file: str | os.PathLike[str], most: int = 2**28) -> bytes:
-    """The content of a file of a user, with at most so many bytes; an error says why it cannot be read."""
+    """The content of a file of a user, of at most `most` bytes; an error says why it cannot be read."""
     try:
         # A pipe would wait for its writer.
         with os.fdopen(os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
@@ -67,4 +67,4 @@ def read_user_toml(file: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         return tomllib.loads(content.decode())
     except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{file}: expected TOML in UTF-8, got a fault: {error}.") from None
+        raise InvalidInputError(f"{file}: invalid TOML: {error}.") from None

@@ -97,10 +97,10 @@ class Registry(Generic[Member]):
         if name not in self:
             raise UnknownNameError(self.kind, name, self.names())
         if name not in self._made:
-            self._made[name] = self.made(name, self._makers[name])
+            self._made[name] = self.call_maker(name, self._makers[name])
         return self._made[name]
 
-    def made(self, name: str, make: Callable[[], object]) -> Member:
+    def call_maker(self, name: str, make: Callable[[], object]) -> Member:
         """The result of a function, which need not be registered.
 
         Args:

@@ -26,7 +26,7 @@ from ikgym.scenarios.preview import FARTHEST as FARTHEST
 from ikgym.scenarios.preview import Preview, offsets
 from ikgym.validation import FloatArray, check_memory, whole_number
 
-# Rows worth a thread of their own: below, handing over costs more than it saves.
+# Rows worth a thread: below, handing over costs more than it saves.
 GRAIN_STEP = 256
 # Steps for which one arm alone computes frames at once: a call of the kernel takes as long as eight frames.
 AT_ONCE = 8
@@ -44,7 +44,7 @@ class Simulator:
         commands: How many of the last commands are shown.
 
     Raises:
-        InvalidInputError: The preview or the number of commands is not valid, or there is no memory for so many rows
+        InvalidInputError: The preview or the number of commands is not valid, or there is no memory for the rows
             or steps.
     """
 
@@ -119,24 +119,24 @@ class Simulator:
         Args:
             active: The rows to reset. Shape (N,).
             generators: One a row; each draws its row's trajectory and plant.
-            starts: Of :meth:`checked`; the scenario's own starts if left out. Shape (N, n).
-            arm_seeds: Of :meth:`checked`; arms are drawn with their episodes if left out.
+            starts: Of :meth:`check_options`; those of the scenario if left out. Shape (N, n).
+            arm_seeds: Of :meth:`check_options`; arms are drawn with their episodes if left out.
             noise_seeds: Which noise of drives and sensors, one a row; 0 is that of the generator, as if left out.
-            steps: Of :meth:`checked`: episodes are entered after so many steps. Shape (N,).
+            steps: Of :meth:`check_options`: episodes are entered after these steps. Shape (N,).
         """
         scenario, state = self.scenario, self._state
         rows = np.flatnonzero(active)
         if len(rows) == 0:
             return
-        own = [generators[row] for row in rows.tolist()]
-        episodes = scenario.trajectory.samples(own)
+        rngs = [generators[row] for row in rows.tolist()]
+        episodes = scenario.trajectory.samples(rngs)
         steps = np.zeros(len(rows), dtype=np.int64) if steps is None else steps[rows]
         q = scenario.first_q_of(episodes) if starts is None else starts[rows]
         if self._plant is not None:
-            jogged = scenario.jogged if scenario.jogs and starts is None else None
-            self._plant.begin(rows, own, arm_seeds, noise_seeds, q, jogged)
+            shift_start = scenario.shift_start if scenario.shifts_start and starts is None else None
+            self._plant.begin(rows, rngs, arm_seeds, noise_seeds, q, shift_start)
             if scenario.draws_obstacles and self._plant.contacts is not None:
-                draw_obstacles(scenario, self._plant.contacts, rows, episodes, own)
+                draw_obstacles(scenario, self._plant.contacts, rows, episodes, rngs)
         state.q[rows], state.qdot[rows], state.step[rows] = q, 0.0, 0
         self._own_start[rows], self._ready = starts is None, 0
         if scenario.random:
@@ -152,7 +152,7 @@ class Simulator:
                 self._plant.settle(entered, state.qdot[entered], steps[later])
             state.step[entered] = steps[later]
 
-    def checked(self, options: Mapping[str, Any]) -> dict[str, Any]:
+    def check_options(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of :meth:`reset` from the options of an environment's reset.
 
         Raises:

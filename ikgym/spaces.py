@@ -42,7 +42,7 @@ def observation_space(scenario: Scenario, preview: Preview, commands: int = 0) -
         ages["q_age"] = spaces.Box(0.0, float(max(plant.q_delay, 1)), (1,), np.float64)
         ages["pose_age"] = spaces.Box(0.0, float(scenario.steps), (1,), np.float64)
     if scenario.obstacles_shown:
-        past["obstacles"] = _between(*scenario.obstacle_bounds())
+        past["obstacles"] = _box_between(*scenario.obstacle_bounds())
     if commands:
         past["commands"] = _box(np.tile(scenario.largest_qdot, (commands, 1)))
     return spaces.Dict(
@@ -63,7 +63,7 @@ def _coordinate_bound(scenario: Scenario, reach: float) -> FloatArray:
     return SLACK * np.array([1.0] * (scenario.task.size - 3) + [reach] * 3)
 
 
-def _between(low: FloatArray, high: FloatArray) -> spaces.Box:
+def _box_between(low: FloatArray, high: FloatArray) -> spaces.Box:
     return spaces.Box(low - 1e-9, high + 1e-9, dtype=np.float64)
 
 

@@ -63,7 +63,7 @@ class Task(Frozen):
             coordinates: Coordinates. Shape (..., m).
 
         Returns:
-            ``nominal - coordinates``, but for the task ``pose`` the position error in [m], then the rotation
+            ``nominal - coordinates``, for the task ``pose`` the position error in [m], then the rotation
             vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for the task ``axis`` the position error, then
             the two components across z* of the rotation vector that takes z to z* by the shortest way, in [rad].
             Its length is the angle between the axes; see :mod:`ikgym.kernels.axes`. Shape (..., e).

@@ -39,7 +39,7 @@ class RedundantIKVectorEnv(
 
     `reset(options={"reset_mask": mask})` resets just the rows where the mask, a Boolean array of shape (N,), is true;
     `{"q": …}` starts elsewhere, with shape (n,) for all rows or (N, n); `{"arm_seed": …}` keeps arms, and
-    `{"step": …}` enters episodes after so many steps, one number for all rows or one a row.
+    `{"step": …}` enters episodes after that many steps, one number for all rows or one a row.
 
     Args:
         num_envs: N.
@@ -113,7 +113,7 @@ class RedundantIKVectorEnv(
         """Begins episodes, in all rows or in those of a mask.
 
         Args:
-            seed: Row i is seeded with seed + i, or with the i-th of a sequence; None goes on with its generator.
+            seed: Row i is seeded with seed + i, or with the i-th of a sequence; None continues with its generator.
             options: ``{"reset_mask": …}`` of shape (N,), ``{"q": …}`` of shape (n,) or (N, n), ``{"arm_seed": …}`` one
                 number for all rows, or one a row, None where the arm is drawn with the episode, ``{"step": …}``
                 likewise, None where an episode begins.
@@ -132,7 +132,7 @@ class RedundantIKVectorEnv(
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not (self._begun | mask).all():
             raise ResetNeededError("The first reset must begin episodes in all rows: leave out the reset_mask.")
-        chosen = self._simulator.checked(options)
+        chosen = self._simulator.check_options(options)
         for row, one in enumerate(seeds):
             if (one is not None or row not in self._generators) and mask[row]:
                 self._generators[row], self._seeds[row] = seeding.np_random(one)

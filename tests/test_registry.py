@@ -71,7 +71,7 @@ def test_scenarios_are_registered_under_their_names():
     assert ikgym.RedundantIKEnv("mine").scenario.steps == 3
     with pytest.raises(InvalidInputError, match="scenario 'mine' is registered already"):
         scenarios.register(mine)
-    with pytest.raises(InvalidInputError, match="make: expected none beside the scenario 'new', got <function"):
+    with pytest.raises(InvalidInputError, match="make: expected none with the scenario 'new', got <function"):
         scenarios.register(mine.replace(name="new"), lambda: mine)
     with pytest.raises(UnknownNameError, match="There is no split"):
         scenarios.seeds(None, 1)

@@ -77,7 +77,7 @@ def solve(
         optimum = search(true, seed, how, tick, paths)
     else:
         best = solve(plain, seed, how, cached=cached, tick=tick).q
-        start = plain.jogged(best, stacked(true.arm.chain))  # a third of the Newton steps from `best` itself
+        start = plain.shift_start(best, stacked(true.arm.chain))  # a third of the Newton steps from `best` itself
         optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
     if on_disk:
         keep(optimum, scenario, seed, how, arm_seed)

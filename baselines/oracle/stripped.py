@@ -30,7 +30,7 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
         return scenario
     drawn = scenario.drawn_plant(seed, arm_seed)
     kept = Plant(payload=drawn.payload, payload_step=plant.payload_step) if np.any(plant.payload) else Plant()
-    start = scenario.start_of(seed, arm_seed) if scenario.jogs else scenario.start
+    start = scenario.start_of(seed, arm_seed) if scenario.shifts_start else scenario.start
     return scenario.replace(
         arm=drawn.arm, model=scenario.model, plant=kept, start=start, obstacles=scenario.obstacles_of(seed)
     )

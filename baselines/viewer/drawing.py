@@ -15,12 +15,12 @@ from baselines.evaluation.plots.style import COLOURS
 from baselines.viewer.meshes import Shape
 from baselines.viewer.readings import FREE, Colour, Reading
 from baselines.viewer.replay import size
-from baselines.viewer.session import Mode, Session, Shown
+from baselines.viewer.session import Mode, PolicyView, Session
 from ikgym.arms import Arm
 from ikgym.kernels.rotations import quaternion
 from ikgym.obstacles.solids import bounded, on_links, surface
 from ikgym.rendering.scene import Scene
-from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thinned
+from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thin
 from ikgym.validation import FloatArray
 
 # Radii and half a length of cylinders, and half the edge of the plate that a half-space is drawn as.
@@ -166,8 +166,8 @@ class Drawing:
                 self._bodies.append(DrawnBodies(server, self._arms[-1].names, start, colour))
             self._references.append(self._scene.add_frame(f"{root}/reference", **axes))
             self._scene.add_icosphere(f"{root}/reference/ball", radius=BALL * whole, color=_rgb(GREEN))
-            _, tool = arm.forward(thinned(replay.q, step))
-            nominal = thinned(stage.frames[:, 9:], step)
+            _, tool = arm.forward(thin(replay.q, step))
+            nominal = thin(stage.frames[:, 9:], step)
             for name, points, hue, width in (
                 ("nominal", nominal, _rgb(PALE_GREEN), 5.0),
                 ("actual", tool, colour, 2.0),
@@ -179,13 +179,13 @@ class Drawing:
             "/policy_0/target", scale=TARGET * whole, disable_rotations=not oriented
         )
         self._target_at: FloatArray | None = None
-        self.show(session.shown())
+        self.show(session.views())
 
     def look(self, camera: Any) -> None:
         """Turns the camera of a browser to the arms."""
         others = len(self._arms) - 1
         far = (FAR + FARTHER * others) * self._size
-        # The panel covers the right: the camera looks at a point beside the middle of the arms.
+        # The panel covers the right: the camera looks at a point next to the middle of the arms.
         middle = -0.5 * APART * others * self._size + BESIDE * far * np.tan(0.5 * VIEW)
         camera.fov = VIEW
         camera.position = (0.9 * far, middle + 0.3 * far, (0.3 + LOOKED_AT) * far)
@@ -196,14 +196,14 @@ class Drawing:
         for bodies in self._bodies:
             bodies.switch(on=on)
 
-    def show(self, shown: Sequence[Shown]) -> None:
+    def show(self, views: Sequence[PolicyView]) -> None:
         """Moves the arms and the reference."""
         mode, reference = self._session.mode, self._session.reference
-        for arm, frame, one in zip(self._arms, self._references, shown, strict=True):
-            arm.show(one.scene.q, one.reading)
-            _move(frame, one.scene.target)
-        for bodies, one in zip(self._bodies, shown, strict=False):  # there may be none
-            bodies.show(one.scene)
+        for arm, frame, view in zip(self._arms, self._references, views, strict=True):
+            arm.show(view.scene.q, view.reading)
+            _move(frame, view.scene.target)
+        for bodies, view in zip(self._bodies, views, strict=False):  # there may be none
+            bodies.show(view.scene)
         for path in self._paths:
             path.visible = mode is Mode.PLAY
         if mode is Mode.FOLLOW:

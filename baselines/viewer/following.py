@@ -52,7 +52,7 @@ class Approach:
         self._made += 1
 
     def ahead(self, steps: npt.ArrayLike) -> FloatArray:
-        """The reference so many steps from now. Shapes (p,) and (p, 12)."""
+        """The reference some steps from now. Shapes (p,) and (p, 12)."""
         return self._line.frames(self._made + np.asarray(steps, dtype=np.float64), self._arm)
 
     def _begin(self, start: FloatArray, target: FloatArray) -> None:
@@ -66,7 +66,7 @@ class Approach:
 class Follower:
     """One policy and its arm, which moves as commanded within the limits: q(k+1) = q(k) + Δt q̇(k).
 
-    The policy keeps its own model of the arm; sensors and drives are ideal. It starts at q in [rad] or [m] (n,).
+    The policy keeps its model of the arm; sensors and drives are ideal. It starts at q in [rad] or [m] (n,).
     """
 
     def __init__(self, scenario: Scenario, policy: SolverPolicy, q: FloatArray) -> None:
@@ -81,7 +81,7 @@ class Follower:
         self.status = Status.UNKNOWN.label
 
     def step(self, approach: Approach) -> None:
-        """Makes one step. An arm whose policy raises an error stands still, and its status has the message."""
+        """Makes one step. An arm whose policy raises an error does not move, and its status has the message."""
         task, arm = self._scenario.task, self._scenario.arm
         # Only the previewed steps, which may be few and far ahead.
         frames = approach.ahead(self._ahead)

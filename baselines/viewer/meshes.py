@@ -109,7 +109,7 @@ def read_urdf(file: pathlib.Path, arm: Arm) -> list[Shape]:
 
 
 def _move(model: Any, arm: Arm, q: FloatArray) -> None:
-    """Moves a model to joint coordinates of the arm; joints that the arm lacks stand at 0."""
+    """Moves a model to joint coordinates of the arm; joints that the arm lacks are at 0."""
     given = dict(zip(arm.joint_names, q.tolist(), strict=True))
     model.update_cfg(np.array([given.get(name, 0.0) for name in model.actuated_joint_names]))
 

@@ -23,7 +23,7 @@ from ikgym.rendering.scene import Scene
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
-# Speed of the reference if the scenario's own stands still, in lengths of the arm per second.
+# Speed of the reference if that of the scenario rests, in lengths of the arm per second.
 SLOW = 0.1
 
 
@@ -41,7 +41,7 @@ class Stage:
     start: FloatArray  # joint coordinates at the start, in [rad] or [m]. Shape (n,)
     # the reference; its rotation is that of the tool at the start if the task has none. (steps + 1, 12)
     frames: FloatArray
-    # largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's own
+    # largest motion of the reference in one step towards a dragged target: in [m] the mean of the scenario's
     # reference, in [rad] the angle that :meth:`ikgym.arms.Arm.inverse` weighs equally
     pace: tuple[float, float]
 

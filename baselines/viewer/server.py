@@ -23,7 +23,7 @@ from baselines.evaluation.table import escape_markdown
 from baselines.viewer.drawing import Drawing
 from baselines.viewer.meshes import Shape
 from baselines.viewer.readings import slider_range
-from baselines.viewer.session import Mode, Session, Shown
+from baselines.viewer.session import Mode, PolicyView, Session
 from ikgym.exceptions import InvalidInputError
 
 # Updates of the scene and of the readings per second.
@@ -51,7 +51,7 @@ class Viewer:
         # Requests of browsers, which come in threads of the server.
         self._requests: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self.drawing = Drawing(server, session, shapes)
-        self.drawing.target.on_update(self._dragged)
+        self.drawing.target.on_update(self._queue_target)
         server.on_client_connect(lambda client: self.drawing.look(client.camera))
         gui.add_markdown(f"**{escape_markdown(stage.scenario.name)}**, seed {stage.seed}\n\n{LEGEND}")
         if session.has_bodies:
@@ -86,25 +86,25 @@ class Viewer:
             while True:
                 self._requests.get_nowait()()
         self.session.advance(seconds)
-        shown = self.session.shown()
-        self.drawing.show(shown)
+        views = self.session.views()
+        self.drawing.show(views)
         self._since_reading += seconds
         if self._since_reading >= 1.0 / READINGS:
             self._since_reading = 0.0
-            self._show_panel(shown)
+            self._show_panel(views)
 
-    def _show_panel(self, shown: Sequence[Shown]) -> None:
+    def _show_panel(self, views: Sequence[PolicyView]) -> None:
         """Shows readings, and the joints of the first policy on the sliders."""
         session = self.session
-        self.readings.content = session.text(shown)
+        self.readings.content = session.text(views)
         self.play.label = "Pause" if session.playing else "Play"
         if session.mode is Mode.PLAY:
-            _set(self.time, session.time)
+            _update(self.time, session.time)
         if session.mode is not Mode.HAND:
-            for slider, coordinate in zip(self.joints, shown[0].scene.q.tolist(), strict=True):
-                _set(slider, min(max(coordinate, slider.min), slider.max))
+            for slider, coordinate in zip(self.joints, views[0].scene.q.tolist(), strict=True):
+                _update(slider, min(max(coordinate, slider.min), slider.max))
 
-    def _dragged(self, _: object) -> None:
+    def _queue_target(self, _: object) -> None:
         # Read at once: the scene may move the target before the request is handled.
         target = self.drawing.target
         rotation, position = SO3(target.wxyz).normalize().as_matrix(), np.array(target.position)
@@ -113,13 +113,13 @@ class Viewer:
     def _on_user(self, controls: Sequence[Any], then: Callable[..., object]) -> None:
         """Queues a request with the values of controls when a user, not the program, has moved one of them."""
 
-        def moved(event: Any) -> None:
+        def on_move(event: Any) -> None:
             if event.client is not None:
                 values = [control.value for control in controls]
                 self._requests.put(lambda: then(*values))
 
         for control in controls:
-            control.on_update(moved)
+            control.on_update(on_move)
 
 
 @contextlib.contextmanager
@@ -181,7 +181,7 @@ def _sliders(gui: Any, session: Session) -> list[Any]:
     ]
 
 
-def _set(control: Any, value: float) -> None:
+def _update(control: Any, value: float) -> None:
     """Shows a value if it differs: viser sends it in any case, and slow browsers would undo the user's change."""
-    if control.value != (shown := round(value, DIGITS)):
-        control.value = shown
+    if control.value != (rounded := round(value, DIGITS)):
+        control.value = rounded

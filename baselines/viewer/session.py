@@ -31,7 +31,7 @@ class Mode(enum.Enum):
     PLAY = "episode"
 
 
-class Shown(NamedTuple):
+class PolicyView(NamedTuple):
     """The arm of one policy at one time."""
 
     policy: str
@@ -84,7 +84,7 @@ class Session:
     def aim(self, target: FloatArray) -> None:
         """Moves the target; the arms follow it from where they are."""
         if self.mode is not Mode.FOLLOW:
-            self._leave(Mode.FOLLOW, self.reference, [shown.scene.q for shown in self.shown()])
+            self._leave(Mode.FOLLOW, self.reference, [view.scene.q for view in self.views()])
         self._approach.aim(target)
 
     def toggle(self) -> None:
@@ -99,23 +99,23 @@ class Session:
         self.time = float(np.clip(moment, 0.0, self.duration))
 
     def advance(self, seconds: float) -> None:
-        """Advances the time by so many [s]."""
+        """Advances the time, in [s]."""
         if self.mode is Mode.FOLLOW:
             self._follow(seconds * self.speed)
         elif self.playing:
             self.time = min(self.time + seconds * self.speed, self.duration)
             self.playing = self.time < self.duration
 
-    def shown(self) -> list[Shown]:
+    def views(self) -> list[PolicyView]:
         """The arm of each policy now."""
-        return [self._shown(number) for number in range(len(self.replays))]
+        return [self._view(number) for number in range(len(self.replays))]
 
-    def text(self, shown: Sequence[Shown]) -> str:
+    def text(self, views: Sequence[PolicyView]) -> str:
         """The readings of each policy, as Markdown."""
         moment = f"t = {self.time:.3f} s" if self.mode is Mode.PLAY else self.mode.value
         if self.mode is Mode.FOLLOW and self.kept < 0.95:
             moment += f"; the policies keep up with {self.kept:.0%} of the speed"
-        return "\n\n".join([f"*{moment}*", *map(self._readings, shown)])
+        return "\n\n".join([f"*{moment}*", *map(self._readings, views)])
 
     def _leave(self, mode: Mode, reference: FloatArray, postures: Sequence[FloatArray]) -> None:
         """Changes the mode, with the arms at the given postures."""
@@ -140,7 +140,7 @@ class Session:
             self.kept += 0.2 * (made / due - self.kept)  # smoothed, to be read
         self._due -= due
 
-    def _shown(self, number: int) -> Shown:
+    def _view(self, number: int) -> PolicyView:
         stage, replay, following = self.stage, self.replays[number], self._followers[number]
         if self.mode is Mode.PLAY:
             k = self.step
@@ -151,14 +151,14 @@ class Session:
             scene, errors, cost = stage.scene(q, self.step, self.reference), (np.nan, np.nan), np.nan
             if following is not None:
                 errors = scene.errors
-        return Shown(replay.policy, scene, *errors, cost, status, self._reader.read(scene.q))
+        return PolicyView(replay.policy, scene, *errors, cost, status, self._reader.read(scene.q))
 
-    def _readings(self, shown: Shown) -> str:
+    def _readings(self, view: PolicyView) -> str:
         """A heading and a list."""
-        scenario, reading, scene = self.stage.scenario, shown.reading, shown.scene
-        status = "" if shown.status == Status.UNKNOWN.label else f": {escape_markdown(shown.status)}"
-        lines = [f"**{escape_markdown(shown.policy)}**{status}\n"]
-        errors = [(shown.position_error, "mm"), (shown.orientation_error, "mrad")]
+        scenario, reading, scene = self.stage.scenario, view.reading, view.scene
+        status = "" if view.status == Status.UNKNOWN.label else f": {escape_markdown(view.status)}"
+        lines = [f"**{escape_markdown(view.policy)}**{status}\n"]
+        errors = [(view.position_error, "mm"), (view.orientation_error, "mrad")]
         if texts := [f"{1e3 * error:.3g} {unit}" for error, unit in errors if np.isfinite(error)]:
             lines.append(f"- error {', '.join(texts)}")
         lines.append(f"- manipulability {reading.manipulability:.3g}, {reading.share:.0%} of the largest found")
@@ -169,6 +169,6 @@ class Session:
         if np.isfinite(scene.clearance):
             pair = scenario.pair_names(scene.closest.pairs[0].tolist())
             lines.append(f"- {1e3 * scene.clearance:.1f} mm between {' and '.join(map(escape_markdown, pair))}")
-        if np.isfinite(shown.cost):
-            lines.append(f"- cost so far {shown.cost:.4g}")
+        if np.isfinite(view.cost):
+            lines.append(f"- cost so far {view.cost:.4g}")
         return "\n".join(lines)

@@ -53,7 +53,7 @@ def names() -> tuple[str, ...]:
 
 
 def register(name: str, make: Callable[[], Arm]) -> None:
-    """Adds an arm of your own.
+    """Adds an arm.
 
     Args:
         name: Its new name.

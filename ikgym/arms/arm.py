@@ -232,7 +232,7 @@ class Arm(Frozen):
 
         Args:
             q: Joint coordinates in [rad] or [m]. Shape (..., n).
-            obstacles: Obstacles around the arm, where they stand.
+            obstacles: Obstacles around the arm, at rest.
 
         Returns:
             Distances in [m], below 0 where two bodies overlap and infinite where nothing can meet, of shape (...); and

@@ -65,7 +65,7 @@ class Bodies(Frozen):
         ends: The other end, in [m]; the starts if left out. Shape (k, 3).
         radii: In [m], at least 1e-12. Shape (k,).
         ignored: Pairs of names whose bodies may touch.
-        unseen: Links that may have a shape, but no body that stands for it, each with the reason. Nothing can be said
+        unseen: Links that may have a shape, but no body around it, each with the reason. Nothing can be said
             about the clearance of an arm that has any.
 
     The bodies are sorted by link. Lengths are at most 1e12.
@@ -87,7 +87,7 @@ class Bodies(Frozen):
         names = different_texts("names of bodies", self.names)
         if len(names) > MOST_BODIES:
             raise InvalidInputError(f"names of bodies: expected at most {MOST_BODIES}, got {len(names)}.")
-        links = [whole_number("links of bodies", link, at_least=0) for link in _listed("links", self.links)]
+        links = [whole_number("links of bodies", link, at_least=0) for link in _to_tuple("links", self.links)]
         starts = _points("starts of bodies", self.starts, len(names))
         ends = starts if self.ends is None else _points("ends of bodies", self.ends, len(names))
         radii = frozen_array("radii of bodies", self.radii, (len(names),), at_least=SMALLEST, at_most=LARGEST)
@@ -160,7 +160,7 @@ class Bodies(Frozen):
             )
 
     def check(self, joints: int) -> None:
-        """Checks that an arm with so many joints has the links.
+        """Checks that an arm with a number of joints has the links.
 
         Raises:
             InvalidInputError: It lacks one; the message names the body.
@@ -194,7 +194,7 @@ class Bodies(Frozen):
         return Shapes(links, self.starts.copy(), self.ends.copy(), self.radii.copy(), sizes, self.pairs.copy())
 
     def surroundings(self, obstacles: Sequence[Neighbour]) -> Surroundings:
-        """Obstacles as kernels see them, those that move at their own place.
+        """Obstacles as kernels see them, moving ones at their initial place.
 
         Args:
             obstacles: The obstacles.
@@ -221,7 +221,7 @@ def _points(name: str, given: npt.ArrayLike, count: int) -> FloatArray:
 
 def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     pairs = []
-    for pair in _listed("ignored pairs", given):
+    for pair in _to_tuple("ignored pairs", given):
         if not isinstance(pair, (tuple, list)) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
             raise InvalidInputError(f"ignored pairs of bodies: expected two names each, got {shortened(pair)}.")
         known_names("body", pair, names)
@@ -229,7 +229,7 @@ def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def _listed(name: str, given: Any) -> tuple[Any, ...]:
+def _to_tuple(name: str, given: Any) -> tuple[Any, ...]:
     if not isinstance(given, (tuple, list, np.ndarray)):
         raise InvalidInputError(f"{name} of bodies: expected a list, got {shortened(given)}.")
     return tuple(given)

@@ -26,7 +26,7 @@ def read(file: str | os.PathLike[str] = FILE) -> dict[str, Callable[[], Arm]]:
     Args:
         file: A TOML file with one table an arm, whose keys are the fields of :class:`ikgym.Arm`. Axes may be words such
             as ``"z -y x"``. The key `like` names another arm of the file, which supplies the missing fields; bodies are
-            that one's and its own.
+            added to those of that arm.
     """
     tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8"))
     return {name: functools.partial(_arm, name, tables) for name in tables}
@@ -43,8 +43,8 @@ def _arm(name: str, tables: dict[str, Any]) -> Arm:
     return Arm(name, **fields)
 
 
-def _bodies(like: dict[str, Any], own: dict[str, Any]) -> Bodies:
-    fields: dict[str, Any] = {key: [*like.get(key, ()), *own.get(key, ())] for key in _fields(like | own)}
+def _bodies(like: dict[str, Any], table: dict[str, Any]) -> Bodies:
+    fields: dict[str, Any] = {key: [*like.get(key, ()), *table.get(key, ())] for key in _fields(like | table)}
     return Bodies(**fields)
 
 

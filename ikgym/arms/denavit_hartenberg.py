@@ -65,7 +65,7 @@ def from_dh(
         link = _screw_x(alpha[i], a[i])
         if convention == "modified":
             frame = frame @ link
-        # The joint turns about, or moves along, the z axis of the frame in front of its own screw.
+        # The joint turns about, or moves along, the z axis of the frame in front of its screw.
         axes[i], points[i] = frame[:3, 2], frame[:3, 3]
         frame = frame @ turn
         if convention == "standard":

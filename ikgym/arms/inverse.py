@@ -78,11 +78,11 @@ def alike(arm: Any, chains: Chain, q: FloatArray, *, oriented: bool) -> FloatArr
         rotations = np.empty((len(q), 0, 0))
     out, converged = np.empty(q.shape), np.empty(len(q), dtype=np.bool_)
     settings = NEARBY._replace(length=length)
-    inverse_rows(*map(_locked, chains), *ranges, *settings, rotations, positions, q, out, converged)
+    inverse_rows(*map(_lock, chains), *ranges, *settings, rotations, positions, q, out, converged)
     return out.round(DECIMALS).clip(arm.lower, arm.upper)
 
 
-def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _lock(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A view that is read-only, as arrays of arms are: kernels would compile anew for another one."""
     view = array.view()
     view.flags.writeable = False
@@ -112,9 +112,9 @@ def _lead(rotation: tuple[int, ...], position: tuple[int, ...], start: tuple[int
         ) from None
 
 
-def _rows(array: FloatArray, lead: tuple[int, ...], own: int) -> FloatArray:
+def _rows(array: FloatArray, lead: tuple[int, ...], axes: int) -> FloatArray:
     """The array repeated for all poses, one row a pose; never read-only, since kernels would compile anew for that."""
-    shape = (*lead, *array.shape[array.ndim - own :])
+    shape = (*lead, *array.shape[array.ndim - axes :])
     if array.shape != shape or not array.flags.writeable:
         array = np.array(np.broadcast_to(array, shape), order="C")
     return array.reshape(math.prod(lead), *shape[len(lead) :])

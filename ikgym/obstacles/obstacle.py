@@ -69,7 +69,7 @@ class Obstacle(Frozen, abc.ABC):
 
     @abc.abstractmethod
     def numbers(self) -> FloatArray:
-        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`, at its own place. Shape (16,).
+        """The obstacle as a row of :class:`ikgym.kernels.bodies.Surroundings`, at its initial place. Shape (16,).
 
         One that has several rows gives all of them, in shape (count, 16).
         """
@@ -84,13 +84,13 @@ class Obstacle(Frozen, abc.ABC):
         Returns:
             Shape (k, 16), or (1, 16) at rest.
         """
-        own = self.numbers()
+        numbers = self.numbers()
         if self.motion is None:
-            return own[None]
-        frames, out = self.motion.frames(times, model), np.tile(own, (len(times), 1))
+            return numbers[None]
+        frames, out = self.motion.frames(times, model), np.tile(numbers, (len(times), 1))
         rotations = frames[:, :9].reshape(-1, 3, 3) if frames.shape[1] == 12 else np.tile(IDENTITY, (len(times), 1, 1))
-        out[:, :9] = (rotations @ own[:9].reshape(3, 3)).reshape(-1, 9)
-        out[:, 9:12] = frames[:, -3:] + rotations @ own[9:12]
+        out[:, :9] = (rotations @ numbers[:9].reshape(3, 3)).reshape(-1, 9)
+        out[:, 9:12] = frames[:, -3:] + rotations @ numbers[9:12]
         return out
 
 

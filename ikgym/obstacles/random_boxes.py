@@ -29,7 +29,7 @@ Count = Annotated[int, Bounds(at_least=1, at_most=MOST_BOXES)]
 class RandomBoxes(Obstacle):
     """Upright boxes, drawn in each episode of a scenario whose path comes from a random joint motion.
 
-    A box has edges of any length within a range, any angle about the vertical axis, and stands near the motion: it is
+    A box has edges of any length within a range, any angle about the vertical axis, and is near the motion: it is
     drawn around a random point of a random body at a random step, and drawn anew until it is near to the arm at that
     step and the motion is clear of it by the margin, at each step and between the steps. So each episode has a clear
     motion. Boxes may overlap each other. Collisions of the arm with itself are not checked. They are called `name 1`,
@@ -117,7 +117,7 @@ class RandomBoxes(Obstacle):
         return out
 
     def boxes(self, rows: FloatArray) -> tuple[Box, ...]:
-        """Drawn boxes as obstacles of their own.
+        """Drawn boxes as fixed obstacles.
 
         Args:
             rows: Result of :meth:`draw` for one episode. Shape (count, 16).
@@ -156,12 +156,12 @@ def drawn_rows(
     paths = joint_paths_of(episodes, np.tile(times, (len(episodes), 1)))
     for i, (one, rows) in enumerate(_with_rows(obstacles)):
         if isinstance(one, RandomBoxes):
-            own = np.array([stream(np.uint64(key), np.uint64(i)) for key in keys], dtype=np.uint64)
-            out[:, rows] = one.draw(arm, paths, own)
+            seeds = np.array([stream(np.uint64(key), np.uint64(i)) for key in keys], dtype=np.uint64)
+            out[:, rows] = one.draw(arm, paths, seeds)
     return out
 
 
-def fixed(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
+def fix_boxes(obstacles: Sequence[Obstacle], numbers: FloatArray) -> tuple[Obstacle, ...]:
     """Obstacles of one episode, none of them random, from their rows of shape (o, 16)."""
     out: list[Obstacle] = []
     for one, rows in _with_rows(obstacles):

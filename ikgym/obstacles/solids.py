@@ -84,7 +84,7 @@ def link_frames(arm: Arm, q: FloatArray) -> FloatArray:
 
 
 def surface(size: FloatArray, stretches: int = STRETCHES) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """The surface of a solid in its own frame, from half of its edges and its radius, the last four numbers of a row.
+    """The surface of a solid, in its frame, from half of its edges and its radius, the last four numbers of a row.
 
     Returns:
         Vertices in [m], of shape (v, 3), and the numbers of three of them for each triangle, of shape (t, 3).
@@ -120,7 +120,7 @@ def outline(size: FloatArray) -> FloatArray:
 
 
 def in_space(solid: FloatArray, points: FloatArray) -> FloatArray:
-    """Points of a solid in the base frame: from its own frame, both of shape (p, 3) in [m]."""
+    """Points of a solid in the base frame: from the frame of the solid; both of shape (p, 3) in [m]."""
     moved: FloatArray = points @ solid[:9].reshape(3, 3).T + solid[9:12]
     return moved
 

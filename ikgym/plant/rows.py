@@ -148,7 +148,7 @@ class PlantRows:
             noise_seeds: Likewise, for the noise of drives and sensors; 0 is the noise of the episode.
             q: Starts of the arm of the data sheet in [rad] or [m], changed in place to those of the arms that move.
                 Shape (k, n).
-            jogged: See :meth:`ikgym.Scenario.jogged`; None where all arms start at the same joint coordinates.
+            jogged: See :meth:`ikgym.Scenario.shift_start`; None where all arms start at the same joint coordinates.
         """
         keys = arm_keys = [episode_key(self._plant, generator) for generator in generators]
         if arm_seeds is not None:

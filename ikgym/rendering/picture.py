@@ -33,7 +33,7 @@ from ikgym.rendering.style import (
     STEEL,
     VERMILION,
     stride,
-    thinned,
+    thin,
 )
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray
@@ -91,7 +91,7 @@ class Picture:
             start: The scene at the start.
             nominal: The nominal positions in [m]. Shape (steps + 1, 3).
         """
-        self._nominal.set_data_3d(thinned(nominal, stride(len(nominal))).T)
+        self._nominal.set_data_3d(thin(nominal, stride(len(nominal))).T)
         arm = self._scenario.arm
         points = [np.zeros(3), start.joints.reshape(-1, 3), start.tool[1], nominal]
         if self._solids:
@@ -125,7 +125,7 @@ class Picture:
             time: The times so far in [s]. Shape (k,).
             errors: Errors of position in [m] and of orientation in [rad]. Shape (k, 2).
         """
-        self._show_arm(scene, thinned(path, self._stride))
+        self._show_arm(scene, thin(path, self._stride))
         if self._solids:
             self._show_solids(scene)
         clearance = f",  clearance {1e3 * scene.clearance:.1f} mm" if math.isfinite(scene.clearance) else ""
@@ -263,7 +263,7 @@ class _ErrorCurve:
     def show(self, time: FloatArray, error: FloatArray, step: int) -> bool:
         """Updates the curve by times in [s] and errors in [m] or [rad] so far, (k,); returns whether axes changed.
 
-        A point is drawn for each stretch of so many steps.
+        A point is drawn for each stretch of `step` steps.
         """
         known = self._decades
         error = error.clip(SMALLEST, LARGEST)
@@ -290,7 +290,7 @@ def _peaks(time: FloatArray, error: FloatArray, step: int) -> tuple[FloatArray, 
     """The largest error of each stretch, so that no peak is lost, and the last error as it is."""
     starts = np.arange(0, len(time) - 1, step)
     peaks = np.maximum.reduceat(error[:-1], starts) if len(starts) else error[:0]
-    return thinned(time, step), np.append(peaks, error[-1])
+    return thin(time, step), np.append(peaks, error[-1])
 
 
 def _outlines(solids: FloatArray) -> FloatArray:

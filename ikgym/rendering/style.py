@@ -20,6 +20,6 @@ def stride(points: int) -> int:
     return -(-points // MOST_POINTS)
 
 
-def thinned(points: FloatArray, step: int) -> FloatArray:
+def thin(points: FloatArray, step: int) -> FloatArray:
     """Each step-th point, and the last."""
     return np.concatenate([points[:-1:step], points[-1:]])

@@ -4,8 +4,8 @@
 >>> ikgym.scenarios.get("varga7-fast").steps
 3000
 
-The scenarios of this package are the TOML files in the folder ``catalogue``. A scenario of your own is such a file, or
-is made in Python; :func:`find` takes all the ways to name one.
+The scenarios of this package are the TOML files in the folder ``catalogue``. A user's scenario is such a file, or is
+made in Python; :func:`find` takes all the ways to name one.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
         MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
     """
     table = read_user_toml(file)
-    with files.located("", file):
+    with files.add_location("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
         if base is None:
@@ -117,15 +117,15 @@ def names(family: str | None = None) -> tuple[str, ...]:
 
 
 def problems_from_elsewhere() -> tuple[str, ...]:
-    """The scenarios that others published; the hundred paths of ``rlitg-random`` also have names of their own."""
+    """The scenarios that others published; each of the hundred paths of ``rlitg-random`` has a name."""
     return names("published")
 
 
 def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = None) -> None:
-    """Adds a scenario of your own.
+    """Adds a scenario.
 
     Args:
-        scenario: The scenario, registered under its own name; or a name, with a function that returns the scenario.
+        scenario: The scenario, registered under its name; or a name, with a function that returns the scenario.
         make: Called without arguments when the scenario is first needed.
 
     Raises:
@@ -136,7 +136,7 @@ def register(scenario: Scenario | str, make: Callable[[], Scenario] | None = Non
     elif make is None:
         _registry.register(scenario.name, lambda: scenario)
     else:
-        raise InvalidInputError(f"make: expected none beside the scenario {scenario.name!r}, got {make!r}.")
+        raise InvalidInputError(f"make: expected none with the scenario {scenario.name!r}, got {make!r}.")
 
 
 def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
@@ -165,7 +165,7 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
             return load(item)
         if ":" in item:
             found = import_object("scenario", item)
-            return _registry.made(item, found if callable(found) else lambda: found)
+            return _registry.call_maker(item, found if callable(found) else lambda: found)
     return get(item)
 
 
@@ -187,7 +187,7 @@ def seeds(split: str, episodes: int) -> tuple[int, ...]:
     return tuple(available[:episodes])
 
 
-def _published(problem: str) -> Scenario:
+def _make_published(problem: str) -> Scenario:
     """The scenario of a problem that has no file; a collision with its obstacles stops the arm.
 
     Bodies are those of our arms, and not the publishers'. Among obstacles the Panda has its hand.
@@ -213,4 +213,4 @@ for _family, _files in FILES.items():
     for _file in _files:
         _registry.register(_file.stem, functools.partial(load, _file), listed=_family not in ("published", "learning"))
 for _name in (*problems.OBSTRUCTED, *problems.names("rlitg-random-")):
-    _registry.register(_name, functools.partial(_published, _name), listed=False)
+    _registry.register(_name, functools.partial(_make_published, _name), listed=False)

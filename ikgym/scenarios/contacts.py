@@ -68,8 +68,8 @@ def draw_obstacles(
     """Draws the obstacles of the episodes of some rows, see :meth:`ikgym.Scenario.drawn_obstacles`."""
     drawn = np.repeat([one.random for one in scenario.obstacles], [one.count for one in scenario.obstacles])
     numbers = scenario.drawn_obstacles(episodes, generators)
-    for row, own in zip(rows.tolist(), numbers, strict=True):
-        contacts.boxes[row][:, drawn] = own[drawn]
+    for row, boxes in zip(rows.tolist(), numbers, strict=True):
+        contacts.boxes[row][:, drawn] = boxes[drawn]
 
 
 def check_clear(scenario: Scenario, out: Outcome, active: BoolArray, q: FloatArray) -> None:

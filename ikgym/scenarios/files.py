@@ -55,14 +55,14 @@ def arguments(
     """The arguments of a dataclass or a function, from a table.
 
     Args:
-        make: The class or the function; its annotations say which arguments are parts, and have tables of their own.
+        make: The class or the function; its annotations say which arguments are parts, which are tables.
         table: Keys are names of arguments.
         folder: Paths of other files are relative to it.
         where: Name of the table in messages.
         like: Whether arguments without a default may be missing.
     """
     parameters, hints = inspect.signature(make).parameters, typing.get_type_hints(make)
-    with located(where):
+    with add_location(where):
         known_names("key", table, parameters)
         for name, parameter in parameters.items():
             if parameter.default is parameter.empty and name not in table and not like:
@@ -75,10 +75,10 @@ def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -
     kind = _part(hint)
     if kind is not None and isinstance(value, list) and typing.get_origin(hint) is Sequence:
         if kind is Obstacle and len(value) > MOST_OBSTACLES:
-            with located(where):
+            with add_location(where):
                 raise InvalidInputError(f"{name}: expected at most {MOST_OBSTACLES} tables, got {len(value)}.")
         return [_value(kind, name, one, folder, where) for one in value]
-    with located(where):
+    with add_location(where):
         if kind is None or kind is Task or (hint is Arm and isinstance(value, str)):
             if (_meaning(hint) == "a text" or kind is Arm) and not isinstance(value, str):
                 raise InvalidInputError(f"{name}: expected a text, got {value!r}.")
@@ -90,11 +90,11 @@ def _value(hint: Any, name: str, value: Any, folder: pathlib.Path, where: str) -
         return _arm(value, folder, where)
     make: Callable[..., Any] = kind
     if kind in CHOICES:
-        with located(where):
+        with add_location(where):
             make = _choice(CHOICES[kind], value)
         value = {key: part for key, part in value.items() if key != "kind"}
     given = arguments(make, value, folder, where)
-    with located(where):
+    with add_location(where):
         if make is from_csv:
             given["file"] = folder / given["file"]
         return make(**given)
@@ -109,14 +109,14 @@ def _arm(table: Table, folder: pathlib.Path, where: str) -> Arm:
         changes = {key: value for key, value in table.items() if key != "like"}
     elif "urdf" in table:
         make = arms.from_urdf
-        own = ("name", "base", "tip", "tool", "tool_rotation", "meshes", "packages", "bodyless")
-        with located(where):
-            known_names("key", table, dict.fromkeys(("urdf", *own, *inspect.signature(Arm).parameters)))
-        given = {"path": table["urdf"], **{key: table[key] for key in own if key in table}}
-        changes = {key: value for key, value in table.items() if key not in ("urdf", *own)}
+        of_file = ("name", "base", "tip", "tool", "tool_rotation", "meshes", "packages", "bodyless")
+        with add_location(where):
+            known_names("key", table, dict.fromkeys(("urdf", *of_file, *inspect.signature(Arm).parameters)))
+        given = {"path": table["urdf"], **{key: table[key] for key in of_file if key in table}}
+        changes = {key: value for key, value in table.items() if key not in ("urdf", *of_file)}
     given = arguments(make, given, folder, where)
     changes = arguments(Arm, changes, folder, where, like=True)
-    with located(where):
+    with add_location(where):
         if make is arms.from_urdf:
             given["path"] = folder / given["path"]
             packages = given.get("packages")
@@ -160,7 +160,7 @@ def _meaning(hint: Any) -> str:
 
 
 @contextlib.contextmanager
-def located(where: str, file: object = None) -> Iterator[None]:
+def add_location(where: str, file: object = None) -> Iterator[None]:
     """Adds the file or the table to the messages of errors."""
     if not where and file is None:
         yield
@@ -215,7 +215,7 @@ def _plain(value: Any, folder: pathlib.Path) -> Any:
                 )
             return {"kind": name, **_fields(value, folder)}
     if type(value) not in PARTS:
-        raise InvalidInputError(f"expected no class of your own, got {type(value).__name__}, which a file cannot hold.")
+        raise InvalidInputError(f"expected a class of ikgym, got {type(value).__name__}, which a file cannot hold.")
     if isinstance(value, Arm):
         return _plain_arm(value, folder)
     fields = _fields(value, folder)
@@ -287,7 +287,7 @@ def document(values: Mapping[str, Any]) -> str:
 
 
 def _lines(values: Mapping[str, Any], within: str) -> list[str]:
-    """The lines of a table, its own values first."""
+    """The lines of a table, plain values before tables."""
     given = {key: value for key, value in values.items() if value is not None}
     lines = [f"{key} = {_text(value)}" for key, value in given.items() if not isinstance(value, Mapping)]
     for key, value in given.items():

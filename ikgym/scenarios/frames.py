@@ -16,7 +16,7 @@ from ikgym.validation import FloatArray
 
 Integers = npt.NDArray[np.int64]
 
-# Rows worth a thread of their own: below, handing over costs more than it saves.
+# Rows worth a thread: below, handing over costs more than it saves.
 GRAIN = 4
 # Rows whose frames are computed at a time: their intermediate results stay small.
 PIECE = 64
@@ -58,8 +58,10 @@ class NominalFrames:
         def work(start: int, stop: int) -> None:
             for part in range(start, stop, PIECE):
                 some = rows[part : min(part + PIECE, stop)]
-                own = [self._episodes[row] for row in some.tolist()]
-                tables[some] = self._scenario.frames_of(own, np.broadcast_to(points, (len(some), len(points))))
+                some_episodes = [self._episodes[row] for row in some.tolist()]
+                tables[some] = self._scenario.frames_of(
+                    some_episodes, np.broadcast_to(points, (len(some), len(points)))
+                )
 
         in_chunks(work, len(rows), GRAIN)
 
@@ -112,8 +114,8 @@ class MotionFrames:
 
     def arguments(self) -> tuple[Chain, Motions]:
         """The first arguments of the kernel."""
-        motions, own = self._motions, (self._first, self.point, self._preview, self._known)
-        return self._scenario.model.chain, Motions(motions.parameters, motions.duration, self._scenario.dt, *own)
+        motions, places = self._motions, (self._first, self.point, self._preview, self._known)
+        return self._scenario.model.chain, Motions(motions.parameters, motions.duration, self._scenario.dt, *places)
 
     def positions(self, row: int) -> FloatArray:
         """The nominal positions of a row's episode in [m], one a step. Shape (steps + 1, 3)."""

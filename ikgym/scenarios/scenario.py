@@ -76,7 +76,7 @@ class Scenario(Frozen):
         cost: The stage cost. The worst episode costs at most 1e150.
         dt: Δt in [s].
         steps: Steps of an episode, 100,000,000 at most. By default those of the whole path and 0.25 s of rest; 1000 for
-            trajectories that go on for ever or are drawn.
+            trajectories that never end or are drawn.
         model: The arm that solvers know, and through which nominal joint paths are mapped; by default the arm itself.
         start: Joint coordinates at the start in [rad] or [m], within the limits of the arm. By default
             the nominal or published ones, or for other Cartesian trajectories those that :meth:`Arm.inverse` finds for
@@ -85,7 +85,7 @@ class Scenario(Frozen):
         iterations_per_point: Steps for which the nominal points 1, 2, … are held; the last number holds for all later
             points. Errors and costs of a point count at its last step.
         plant: Deviations of the arm, its drives and its sensors from the data sheet; none by default.
-        obstacles: Obstacles that stand or move, at most 1000, with different names.
+        obstacles: Obstacles at rest or moving, at most 1000, with different names.
         collisions: Whether an arm whose bodies touch each other or an obstacle is stopped for the rest of the episode.
             By default it is where there are obstacles. The meshes of an arm from a URDF file are opened then, and each
             link needs a body, see :attr:`Bodies.unseen`.
@@ -210,7 +210,7 @@ class Scenario(Frozen):
         steps = whole_number(name, value, at_least=1)
         if steps > MOST_STEPS:
             raise InvalidInputError(
-                f"{name}: expected a whole number of at most {MOST_STEPS}, got {steps}; so many nominal points would "
+                f"{name}: expected a whole number of at most {MOST_STEPS}, got {steps}; their nominal points would "
                 f"take about {gib(self._bytes_of(steps))} of memory."
             )
         return steps
@@ -231,7 +231,7 @@ class Scenario(Frozen):
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one.
 
-        A new arm is its own model if none is given. If an action of 1 meant the old arm's velocity limits, it means
+        A new arm is also the model if none is given. If an action of 1 meant the old arm's velocity limits, it means
         those of the new arm, where all of them are finite. An arm with other limits of jerk brings these.
 
         Raises:
@@ -258,7 +258,7 @@ class Scenario(Frozen):
             file: A name that ends in ``.toml``. A file that is there already is replaced.
 
         Raises:
-            InvalidInputError: The scenario has a part that no file can hold, such as a trajectory of your own class,
+            InvalidInputError: The scenario has a part that no file can hold, such as a trajectory of a user's class,
                 or the file cannot be written. No file has changed then.
         """
         if type(self) is not Scenario:
@@ -325,17 +325,17 @@ class Scenario(Frozen):
             InvalidInputError: There is no seed where one is needed, or the arm cannot be there.
         """
         q = self.first_q(self.episode(seed))
-        if not self.jogs:
+        if not self.shifts_start:
             return q
-        start: FloatArray = self.jogged(q[None], stacked(self.drawn_plant(seed, arm_seed).arm.chain))[0]
+        start: FloatArray = self.shift_start(q[None], stacked(self.drawn_plant(seed, arm_seed).arm.chain))[0]
         return start
 
     @functools.cached_property
-    def jogs(self) -> bool:
+    def shifts_start(self) -> bool:
         """Whether episodes begin at the first pose of the arm that moves, which is not that of the data sheet."""
         return self.start is None and self.plant.other_arm
 
-    def jogged(self, q: FloatArray, chains: Chain) -> FloatArray:
+    def shift_start(self, q: FloatArray, chains: Chain) -> FloatArray:
         """Starts of other arms: each at the pose at which the arm of the data sheet would begin.
 
         Args:
@@ -488,7 +488,7 @@ class Scenario(Frozen):
             Numbers of points. Shape (steps + preview + 1,).
 
         Raises:
-            InvalidInputError: There is no memory for so many.
+            InvalidInputError: There is no memory for that many points.
         """
         last = self.steps + furthest(preview)
         check_memory(f"The {last + 1} nominal points of an episode", self._bytes_of(last + 1))
@@ -524,7 +524,7 @@ class Scenario(Frozen):
         return np.ascontiguousarray(frames if self.task.has_orientation else frames[:, -3:])
 
     def frames_of(self, episodes: Sequence[Trajectory], points: npt.NDArray[np.int64]) -> FloatArray:
-        """The nominal frames of several episodes, each at points of its own; bit for bit those of :meth:`frames`.
+        """The nominal frames of several episodes, each at different points; bit for bit those of :meth:`frames`.
 
         Args:
             episodes: Trajectories of the k episodes.
@@ -615,7 +615,7 @@ class Scenario(Frozen):
         generator = seeding.np_random(seed)[0]
         episodes = self.trajectory.samples([generator])
         episode_key(self.plant, generator)  # drawn before them
-        return random_boxes.fixed(self.obstacles, self.drawn_obstacles(episodes, [generator])[0])
+        return random_boxes.fix_boxes(self.obstacles, self.drawn_obstacles(episodes, [generator])[0])
 
     @property
     def _step_times(self) -> FloatArray:

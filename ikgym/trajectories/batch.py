@@ -34,11 +34,11 @@ class JointMotions(Sequence[Trajectory]):
         """One of the motions."""
 
     def blank(self, rows: int) -> JointMotions:
-        """So many motions of this kind, to be filled in."""
+        """A number of motions of this kind, to be filled in."""
         return type(self)(np.zeros((rows, *self.parameters.shape[1:])), self.duration)
 
     def joint_paths(self, times: FloatArray) -> FloatArray:
-        """The joint path of each motion at times of its own, of shape (k, t): see :meth:`Trajectory.joint_path`."""
+        """The joint path of each motion at different times, of shape (k, t): see :meth:`Trajectory.joint_path`."""
         return paths_of(self.parameters, times, self.duration)
 
 
@@ -51,7 +51,7 @@ def paths_of(parameters: FloatArray, times: FloatArray, duration: float) -> Floa
 
 
 def frames_of(trajectories: Sequence[Trajectory], times: FloatArray, model: Arm) -> FloatArray:
-    """The nominal poses of several trajectories, each at times of its own.
+    """The nominal poses of several trajectories, each at different times.
 
     Args:
         trajectories: One a row.
@@ -81,7 +81,7 @@ def first_joints_of(trajectories: Sequence[Trajectory]) -> FloatArray | None:
 
 
 def joint_paths_of(trajectories: Sequence[Trajectory], times: FloatArray) -> FloatArray:
-    """The joint paths of several trajectories that have one, each at times of its own.
+    """The joint paths of several trajectories that have one, each at different times.
 
     Args:
         trajectories: One a row.

@@ -141,14 +141,14 @@ class RandomJointSpline(Trajectory):
             InvalidInputError: A joint has no limit; the message says which, and how to give one.
         """
         limits = ("lower", "upper", "velocity_limit", "acceleration_limit")
-        own = {name: getattr(arm, name) for name in limits if name not in parameters}
-        for name, value in own.items():
+        limits_of_arm = {name: getattr(arm, name) for name in limits if name not in parameters}
+        for name, value in limits_of_arm.items():
             if without := np.flatnonzero(~np.isfinite(value)).tolist():
                 raise InvalidInputError(
                     f"{name}: expected one for every joint, since arm {arm.name!r} has none at joint "
                     f"{', '.join(map(str, without))}; give {name} as a parameter."
                 )
-        return cls(**own, duration=duration, **parameters)
+        return cls(**limits_of_arm, duration=duration, **parameters)
 
     def sample(self, rng: np.random.Generator) -> JointSpline:
         """See :meth:`Trajectory.sample`. Draws starts, then scales, then moves, joint by joint each."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ikgym import problems
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, listed
+from ikgym.exceptions import InvalidInputError, list_names
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
 from ikgym.validation import FloatArray, Positive, shortened
@@ -90,7 +90,7 @@ class RandomPublishedPath(Trajectory):
         if not members or not all(len(problems.waypoints(name).starts) for name in members):
             raise InvalidInputError(
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
-                f"available: {listed(problems.names())}."
+                f"available: {list_names(problems.names())}."
             )
 
     def sample(self, rng: np.random.Generator) -> PublishedPath:

@@ -57,7 +57,7 @@ class Sinusoid(Trajectory):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RandomSinusoid(Trajectory):
-    """A distribution over :class:`Sinusoid`: every joint with its own amplitude, frequency and phase.
+    """A distribution over :class:`Sinusoid`: every joint with a different amplitude, frequency and phase.
 
     Args:
         amplitude: Largest amplitudes in [rad] or [m]. Shape (n,).
@@ -81,18 +81,18 @@ class RandomSinusoid(Trajectory):
 
     def sample(self, rng: np.random.Generator) -> Sinusoid:
         """See :meth:`Trajectory.sample`. Draws scales, then frequencies, then phases."""
-        motion: Sinusoid = self._drawn([rng])[0]
+        motion: Sinusoid = self._draw([rng])[0]
         return motion
 
     def samples(self, generators: Sequence[np.random.Generator]) -> Sequence[Trajectory]:
-        """See :meth:`Trajectory.samples`; all of them are computed at once, but for a subclass that may draw others."""
-        return self._drawn(generators) if type(self) is RandomSinusoid else super().samples(generators)
+        """See :meth:`Trajectory.samples`; all at once, except in a subclass, which may draw others."""
+        return self._draw(generators) if type(self) is RandomSinusoid else super().samples(generators)
 
     def joint_bound(self) -> FloatArray:
         """See :meth:`Trajectory.joint_bound`; true for all that may be drawn."""
         return np.abs(self.amplitude) * max(map(abs, self.scale))
 
-    def _drawn(self, generators: Sequence[np.random.Generator]) -> Sinusoids:
+    def _draw(self, generators: Sequence[np.random.Generator]) -> Sinusoids:
         drawn, limits = np.empty((len(generators), 3, len(self.amplitude))), (self.scale, self.frequency, self.phase)
         for numbers, rng in zip(drawn, generators, strict=True):
             rng.random(out=numbers)

@@ -76,7 +76,7 @@ class ArcLength:
         self._speed, self._breaks = speed, breaks
         starts = range(0, len(breaks) - 1, _TOGETHER)
         parts = [breaks[i : i + _TOGETHER + 1] for i in starts]
-        pieces = [self._between(part[:-1], part[1:]) for part in parts]
+        pieces = [self._integrate(part[:-1], part[1:]) for part in parts]
         self.lengths: FloatArray = np.concatenate([[0.0], np.cumsum(np.concatenate(pieces))])
 
     def parameter(self, s: FloatArray) -> FloatArray:
@@ -86,11 +86,11 @@ class ArcLength:
         share = (s - self.lengths[i]) / (self.lengths[i + 1] - self.lengths[i])
         u = np.clip(first + share * (last - first), first, last)
         for _ in range(4):  # Newton's method, whose error is squared each time
-            excess = self.lengths[i] + self._between(first, u) - s
+            excess = self.lengths[i] + self._integrate(first, u) - s
             u = np.clip(u - excess / self._speed(u), first, last)
         return u
 
-    def _between(self, first: FloatArray, last: FloatArray) -> npt.NDArray[np.float64]:
+    def _integrate(self, first: FloatArray, last: FloatArray) -> npt.NDArray[np.float64]:
         half = 0.5 * (last - first)
         at = 0.5 * (first + last)[:, None] + half[:, None] * _NODES
         return half * (self._speed(at) @ _WEIGHTS)

@@ -66,7 +66,7 @@ class Trajectory(Frozen):
         """
         path = self.joint_path(times)
         if path is None:
-            raise InvalidInputError("A random trajectory has no path of its own: sample one first.")
+            raise InvalidInputError("A random trajectory has no path: sample one first.")
         return frames_along(path, model)
 
     def joint_bound(self) -> FloatArray | None:

@@ -62,7 +62,7 @@ def through(
     given = {"speed": speed, "acceleration": acceleration, "corner_radius": corner_radius, "orientation": orientation}
     if times is not None:
         if others := [name for name, value in given.items() if value is not None]:
-            raise InvalidInputError(f"{others[0]}: expected none beside times, which say how fast, got one.")
+            raise InvalidInputError(f"{others[0]}: expected none with times, which state the pace, got one.")
         return TimedWaypoints(times, positions, quaternions)  # type: ignore[arg-type]  # checked there, as below
     known_name("time law", time_law, TIME_LAWS)
     for name in ("speed", "acceleration"):
@@ -70,7 +70,7 @@ def through(
             raise InvalidInputError(f"{name}: expected a number, or times of the waypoints, got neither.")
     if quaternions is not None:
         if orientation is not None:
-            raise InvalidInputError("orientation: expected none beside quaternions, got one.")
+            raise InvalidInputError("orientation: expected none with quaternions, got one.")
         orientation = OrientationThrough(frozen_array("quaternions", quaternions, (len(positions), 4)))
     path: Path = SplinePath(positions) if corner_radius is None else Polyline(positions, corner_radius)
     return PathTrajectory(path, TIME_LAWS[time_law](speed, acceleration), orientation)  # type: ignore[arg-type]
@@ -126,7 +126,7 @@ def _columns(file: str | os.PathLike[str]) -> dict[str, FloatArray]:
         raise InvalidInputError(f"{file}: expected a CSV file: {error}.") from None
     if len(rows) > MOST_POINTS + 1:
         raise InvalidInputError(f"{file}: expected at most {MOST_POINTS} waypoints, got more lines than that.")
-    # Lines are counted as an editor does; those without anything may only stand at the end.
+    # Lines are counted as an editor does; empty ones may only be at the end.
     while rows and not any(cell.strip() for cell in rows[-1]):
         rows.pop()
     names = [cell.strip() for cell in rows[0]] if rows else []

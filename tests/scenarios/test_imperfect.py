@@ -73,5 +73,5 @@ def test_an_arm_that_is_kept_is_jogged_and_a_start_that_is_given_is_not():
     env.reset(seed=1, options={"q": q})
     np.testing.assert_array_equal(env._simulator.true_q[0], q)
     given = scenario.replace(start=q)
-    assert not given.jogs
+    assert not given.shifts_start
     np.testing.assert_array_equal(given.start_of(1), q)

@@ -54,7 +54,7 @@ def test_nominal_is_the_model_on_the_nominal_joint_path(name):
     else:
         poses = scenario.task.coordinates(*scenario.model.forward(path))
         np.testing.assert_array_equal(nominal, poses)
-        assert scenario.jogs or np.array_equal(scenario.start_of(3), path[0])
+        assert scenario.shifts_start or np.array_equal(scenario.start_of(3), path[0])
         observation, _ = ikgym.RedundantIKEnv(scenario.replace(plant=ikgym.Plant())).reset(seed=3)
         np.testing.assert_array_equal(observation["q"], path[0])
 

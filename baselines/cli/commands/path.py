@@ -106,7 +106,7 @@ def _scenario(options: Options) -> Scenario:
 def _obstacles(file: pathlib.Path) -> dict[str, Any]:
     """The obstacles of a file, as a field of a scenario."""
     table = read_user_toml(file)
-    with files.located("", file):
+    with files.add_location("", file):
         known_names("key", table, [field.name for field in dataclasses.fields(Scenario)])
         if "obstacles" not in table:
             raise InvalidInputError("obstacles: expected tables [[obstacles]], got no such key.")

@@ -69,14 +69,14 @@ def with_bodies(
         if solids or reasons:
             looked.add(place.number)
         if solids:
-            capsules = list(_outermost(_placed(arm, place, link, solids)))
-            found += _named(link, place.number, capsules)
+            capsules = list(_outermost(_place_capsules(arm, place, link, solids)))
+            found += _name_capsules(link, place.number, capsules)
             sources = dict.fromkeys(solid.source for _, solid in solids)
             volumes = sum(solid.volume for _, solid in solids), sum(capsule.volume for capsule in capsules)
             shapes.append(LinkShapes(link, " and ".join(sources), *volumes))
         if len(found) > MAX_BODIES:
             raise InvalidInputError(f"expected at most {MAX_BODIES} bodies from collision shapes, got more.")
-    for link in tree.between(base, tip):
+    for link in tree.links_between(base, tip):
         number = _place(arm, tree.path(base, link)).number
         if number not in looked:
             looked.add(number)
@@ -121,7 +121,7 @@ def _place(arm: Arm, path: Sequence[Element]) -> _Place:
     return _Place(number, rigid, placement)
 
 
-def _placed(arm: Arm, place: _Place, link: str, solids: Sequence[tuple[Element, Solid]]) -> list[Capsule]:
+def _place_capsules(arm: Arm, place: _Place, link: str, solids: Sequence[tuple[Element, Solid]]) -> list[Capsule]:
     """The capsules of a link in the frame of the arm's link."""
     import pinocchio
 
@@ -150,7 +150,7 @@ def _outermost(capsules: list[Capsule]) -> Iterator[Capsule]:
             yield one
 
 
-def _named(link: str, number: int, capsules: list[Capsule]) -> Iterator[tuple[str, int, Capsule]]:
+def _name_capsules(link: str, number: int, capsules: list[Capsule]) -> Iterator[tuple[str, int, Capsule]]:
     for i, capsule in enumerate(capsules, 1):
         yield link if len(capsules) == 1 else f"{link}[{i}]", number, capsule
 

@@ -133,7 +133,7 @@ def only_tip(tree: Tree, base: str) -> str:
     if len(leaves) == 1 and not leaves[0].gripper:
         return leaves[0].link
     frames = [tip for tip in found if tip.frame and not tip.fault and not tip.gripper]
-    passed = [xml.required("", joint, "child").get("link") for joint in tree.path(base, (frames or found)[0].link)]
+    passed = [xml.find_required("", joint, "child").get("link") for joint in tree.path(base, (frames or found)[0].link)]
     if frames and all(tip.link in passed for tip in frames):
         logger.info("the arm ends at %r, the only tool frame", frames[0].link)
         return frames[0].link
@@ -183,7 +183,7 @@ def read_joint(element: Element) -> UrdfJoint:
             f"{where}: expected one of {xml.listing(READABLE)} on the way to the tip, got {kind!r}."
         )
     if element.find("mimic") is not None:
-        raise InvalidInputError(f"{where}: expected a joint that moves on its own, got one with <mimic>.")
+        raise InvalidInputError(f"{where}: expected an independent joint, got one with <mimic>.")
     xml.known_elements(where, element, ELEMENTS)
     xyz, rpy = read_origin(where, element)
     axis, remarks = _axis(where, element) if kind in MOVING else ((1.0, 0.0, 0.0), [])
@@ -196,7 +196,7 @@ def read_origin(where: str, element: Element) -> tuple[tuple[float, ...], tuple[
 
     URDF 1.1 has ``quat_xyzw`` in place of ``rpy``.
     """
-    origin = xml.optional(where, element, "origin")
+    origin = xml.find_optional(where, element, "origin")
     if origin is not None:
         xml.known_attributes(where, origin, ("xyz", "rpy", "quat_xyzw"))
     xyz, rpy = (xml.numbers(where, origin, key, 3) for key in ("xyz", "rpy"))
@@ -220,7 +220,7 @@ def _to_rpy(where: str, quaternion: tuple[float, ...]) -> tuple[float, ...]:
 
 def _axis(where: str, element: Element) -> tuple[tuple[float, ...], list[str]]:
     """The axis of a joint, of unit length, and a remark where it was not."""
-    given = xml.optional(where, element, "axis")
+    given = xml.find_optional(where, element, "axis")
     if given is None:
         return (1.0, 0.0, 0.0), []
     xml.known_attributes(where, given, ("xyz",))
@@ -245,7 +245,7 @@ def _doubts(where: str, kind: str, lower: float, upper: float, velocity: float) 
 def _limits(where: str, element: Element, kind: str) -> tuple[float, float, float]:
     """Lower and upper limit, and largest speed."""
     lower, upper, velocity = -math.inf, math.inf, math.inf
-    limit = xml.optional(where, element, "limit") if kind in MOVING else None
+    limit = xml.find_optional(where, element, "limit") if kind in MOVING else None
     if limit is None and kind in BOUNDED:
         raise InvalidInputError(f"{where}: expected a <limit>, got none; an endless joint is of type 'continuous'.")
     if limit is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from ikgym.exceptions import MissingDependencyError
 from ikgym.validation import FloatArray
 
-# A box has at most so many capsules side by side.
+# Most capsules side by side in a box.
 MOST = 4
 # Capsules that a search around points tries from each of their principal axes, and how many points it looks at: a fine
 # mesh of a round body has 100,000 corners on its hull.

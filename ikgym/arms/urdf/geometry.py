@@ -31,7 +31,7 @@ class Solid(NamedTuple):
     """A solid and the capsules around it.
 
     Attributes:
-        capsules: In its own frame.
+        capsules: In the frame of the shape.
         volume: Of the solid in [m³]; that of its convex hull for a mesh.
         source: ``mesh`` or ``shape``.
     """
@@ -52,7 +52,7 @@ def read_solid(where: str, collision: Element, folders: Sequence[Path] | None) -
     Returns:
         A mesh that is not opened is a text, the reason.
     """
-    geometry = list(xml.required(where, collision, "geometry"))
+    geometry = list(xml.find_required(where, collision, "geometry"))
     if len(geometry) != 1 or geometry[0].tag not in (*READERS, "mesh"):
         got = xml.listing([shape.tag for shape in geometry])
         raise InvalidInputError(f"{where}: expected one of {xml.listing([*READERS, 'mesh'])} in <geometry>, got {got}.")

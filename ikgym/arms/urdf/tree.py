@@ -31,11 +31,11 @@ class Tree:
             raise InvalidInputError(f"expected the root element <robot>, got <{robot.tag}>.")
         if any("xacro" in element.tag for element in robot):
             raise InvalidInputError("expected a URDF, got macros of xacro; expand them first: xacro FILE > arm.urdf")
-        self._elements = xml.named(robot, "link")
+        self._elements = xml.index_by_name(robot, "link")
         self.links = tuple(self._elements)
         self._above: dict[str, tuple[Element, str]] = {}
         self._below: dict[str, list[str]] = {link: [] for link in self.links}
-        for joint in xml.named(robot, "joint").values():
+        for joint in xml.index_by_name(robot, "joint").values():
             self._add(joint)
         self.root = self._only_root()
         self.name = xml.attribute("robot", robot, "name")
@@ -44,7 +44,8 @@ class Tree:
         where = xml.label(joint)
         xml.attribute(where, joint, "type", KINDS)
         parent, child = (
-            xml.attribute(where, xml.required(where, joint, end), "link", self._below) for end in ("parent", "child")
+            xml.attribute(where, xml.find_required(where, joint, end), "link", self._below)
+            for end in ("parent", "child")
         )
         if child in self._above:
             both = f"{xml.label(self._above[child][0])} and {where}"
@@ -74,9 +75,9 @@ class Tree:
         """Whether a link has a visual shape."""
         return self._elements[link].find("visual") is not None
 
-    def between(self, base: str, tip: str) -> list[str]:
+    def links_between(self, base: str, tip: str) -> list[str]:
         """The links from base to tip, without the base."""
-        return [xml.required("", joint, "child").get("link", "") for joint in self.path(base, tip)]
+        return [xml.find_required("", joint, "child").get("link", "") for joint in self.path(base, tip)]
 
     def path(self, base: str, tip: str) -> list[Element]:
         """The joints from base to tip."""

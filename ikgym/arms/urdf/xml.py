@@ -33,13 +33,13 @@ def _refuse_doctype(*_: object) -> None:
     raise InvalidInputError("expected no DOCTYPE: a URDF needs none, and its entities could grow without bound.")
 
 
-def named(robot: Element, tag: str) -> dict[str, Element]:
+def index_by_name(robot: Element, tag: str) -> dict[str, Element]:
     """The elements of a tag by their names, which must differ; at least one."""
     found: dict[str, Element] = {}
     for element in robot.iterfind(tag):
         name = attribute("robot", element, "name")
         if name in found:
-            raise InvalidInputError(f"expected every {tag} to have a name of its own, got two called {name!r}.")
+            raise InvalidInputError(f"expected every {tag} to have a different name, got two called {name!r}.")
         found[name] = element
     if not found:
         raise InvalidInputError(f"expected at least one <{tag}> in <robot>, got none.")
@@ -51,15 +51,15 @@ def label(joint: Element) -> str:
     return f"joint {joint.get('name')!r}"
 
 
-def required(where: str, element: Element, tag: str) -> Element:
+def find_required(where: str, element: Element, tag: str) -> Element:
     """The one element of a tag within another one."""
-    found = optional(where, element, tag)
+    found = find_optional(where, element, tag)
     if found is None:
         raise InvalidInputError(f"{where}: expected a <{tag}>, got none.")
     return found
 
 
-def optional(where: str, element: Element, tag: str) -> Element | None:
+def find_optional(where: str, element: Element, tag: str) -> Element | None:
     """Likewise; None where there is none."""
     found = element.findall(tag)
     if len(found) > 1:

@@ -49,11 +49,11 @@ class Outline(Path):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        outline = self._outlined()
+        outline = self._make_outline()
         self._settle(outline=outline, length=outline.length, curvature=outline.curvature)
 
     @abc.abstractmethod
-    def _outlined(self) -> Path:
+    def _make_outline(self) -> Path:
         """The other path, from checked fields."""
 
     def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:

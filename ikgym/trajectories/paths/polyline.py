@@ -149,7 +149,7 @@ class Square(Outline):
     corner_radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    def _outlined(self) -> Polyline:
+    def _make_outline(self) -> Polyline:
         number("corner_radius", self.corner_radius, at_most=0.5 * self.side)
         corners = np.array([[0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0], [0, -1, 0]])
         return Polyline(self.center + 0.5 * self.side * corners @ self.rotation.T, self.corner_radius)
@@ -179,7 +179,7 @@ class Raster(Outline):
     corner_radius: Positive
     rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
 
-    def _outlined(self) -> Polyline:
+    def _make_outline(self) -> Polyline:
         between = self.height / (self.lines - 1)
         number("corner_radius", self.corner_radius, at_most=0.5 * min(between, self.width))
         rows = np.repeat(np.linspace(-0.5, 0.5, self.lines) * self.height, 2)

@@ -15,7 +15,7 @@ from ikgym.validation import FloatArray, Positive, Rotation, Signed, Vector
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CircularHelix(Path):
-    """A helix, ``x = r cos φ, y = r sin φ, z = c φ / 2π`` in a frame of its own, from φ = 0.
+    """A helix, ``x = r cos φ, y = r sin φ, z = c φ / 2π`` in the frame of the path, from φ = 0.
 
     Args:
         center: Where the axis begins, in [m]. Shape (3,).
@@ -55,7 +55,7 @@ class CircularHelix(Path):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Circle(CircularHelix):
-    """A circle, ``x = r cos φ, y = r sin φ`` in a frame of its own, from φ = 0.
+    """A circle, ``x = r cos φ, y = r sin φ`` in the frame of the path, from φ = 0.
 
     Args:
         center: In [m]. Shape (3,).
@@ -72,7 +72,7 @@ class Circle(CircularHelix):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Lemniscate(Path):
-    """Bernoulli's lemniscate, ``(x, y) = a cos φ (1, sin φ) / (1 + sin² φ)`` in a frame of its own, from its right end.
+    """Bernoulli's lemniscate, ``(x, y) = a cos φ (1, sin φ) / (1 + sin² φ)``, from its right end.
 
     Args:
         center: Where it crosses itself, in [m]. Shape (3,).

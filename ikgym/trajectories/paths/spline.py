@@ -63,10 +63,10 @@ class SplinePath(Path):
     @functools.cached_property
     def _arc(self) -> ArcLength:
         spline = self._spline
-        return ArcLength(lambda u: np.linalg.norm(spline(u, 1), axis=-1), _refined(spline.knots, PIECES))
+        return ArcLength(lambda u: np.linalg.norm(spline(u, 1), axis=-1), _refine(spline.knots, PIECES))
 
 
-def _refined(knots: FloatArray, pieces: int) -> FloatArray:
+def _refine(knots: FloatArray, pieces: int) -> FloatArray:
     """The same knots with ``pieces - 1`` more in between. Shape ((k - 1) pieces + 1,)."""
     at = np.arange((len(knots) - 1) * pieces + 1) / pieces
     return np.interp(at, np.arange(len(knots)), knots)

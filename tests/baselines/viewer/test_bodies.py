@@ -50,7 +50,7 @@ def test_without_collisions_they_are_off_and_without_bodies_not_there(server):
     off = servers.Viewer(server, Session(Stage.of(crowd(steps=5).replace(collisions=False)), ["dls"]))
     assert not off.bodies.value
     assert not off.drawing._bodies[0]._bodies[0].visible
-    assert " between " not in off.session.text(off.session.shown())
+    assert " between " not in off.session.text(off.session.views())
     server.scene.reset()
     server.gui.reset()
     none = servers.Viewer(server, Session(Stage.of("varga7-fast", steps=5), ["dls"]))
@@ -61,6 +61,6 @@ def test_without_collisions_they_are_off_and_without_bodies_not_there(server):
 def test_an_arm_that_is_stopped_is_shown_at_its_obstacle(server):
     viewer = servers.Viewer(server, Session(Stage.of(blocked()), ["dls"]))
     viewer.session.scrub(1.5)
-    text = viewer.session.text(viewer.session.shown())
+    text = viewer.session.text(viewer.session.views())
     assert "- 0.0 mm between" in text
     assert "and post" in text

@@ -85,7 +85,7 @@ def test_a_browser_is_told_the_scene_and_its_controls_do_what_they_say(server, v
         assert not session.playing
         browser.set(viewer.joints[3], -1.0)
         wait_for(viewer, lambda: session.mode is Mode.HAND)
-        assert session.shown()[0].scene.q[3] == -1.0
+        assert session.views()[0].scene.q[3] == -1.0
         session.scrub(0.0)
         viewer.tick(0.0)
         browser.drag(target, target.position + np.array([0.0, 0.0, 0.01]))
@@ -110,7 +110,7 @@ def test_what_the_program_sets_is_not_taken_for_a_user(viewer):
     viewer.tick(1.0)  # readings and sliders are due
     viewer.tick(0.0)
     assert viewer.session.mode is Mode.PLAY
-    assert viewer.joints[0].value == pytest.approx(viewer.session.shown()[0].scene.q[0], abs=1e-4)
+    assert viewer.joints[0].value == pytest.approx(viewer.session.views()[0].scene.q[0], abs=1e-4)
     assert "dls" in viewer.readings.content
 
 

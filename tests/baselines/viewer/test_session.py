@@ -98,12 +98,12 @@ def test_a_placed_arm_has_forgotten(stage):
 
 def test_play_speed_pause_end_and_scrub(session):
     assert (session.mode, session.playing, session.step) == (Mode.PLAY, False, 0)
-    for one in session.shown():
+    for one in session.views():
         np.testing.assert_array_equal(one.scene.q, session.stage.start)
     session.toggle()
     session.advance(0.01)
     assert session.step == 10
-    for one, replay in zip(session.shown(), session.replays, strict=True):
+    for one, replay in zip(session.views(), session.replays, strict=True):
         np.testing.assert_array_equal(one.scene.q, replay.q[10])
         assert (one.position_error, one.cost) == (replay.position_error[10], replay.cost[10])
     np.testing.assert_array_equal(session.reference, session.stage.frames[10])
@@ -126,7 +126,7 @@ def test_play_speed_pause_end_and_scrub(session):
 def test_joints_by_hand_stay_within_the_limits(session):
     arm = session.stage.scenario.arm
     session.place(np.full(7, 10.0))
-    for one in session.shown():
+    for one in session.views():
         np.testing.assert_array_equal(one.scene.q, arm.upper)
         np.testing.assert_allclose(one.reading.margins, 0.0, atol=1e-12)
         assert one.position_error == pytest.approx(0.0, abs=1e-12)
@@ -135,14 +135,14 @@ def test_joints_by_hand_stay_within_the_limits(session):
 
 def test_arms_follow_a_target_from_where_they_are(session):
     session.scrub(0.02)
-    before = [one.scene.q for one in session.shown()]
+    before = [one.scene.q for one in session.views()]
     target = moved(session.reference, [0.0, 0.0, 0.005], 0.02)
     session.aim(target)
     assert session.mode is Mode.FOLLOW
-    for one, q in zip(session.shown(), before, strict=True):
+    for one, q in zip(session.views(), before, strict=True):
         np.testing.assert_array_equal(one.scene.q, q)
     session.advance(2.0)
-    for one in session.shown():
+    for one in session.views():
         assert one.position_error < 1e-4
         assert one.orientation_error < 1e-3
         np.testing.assert_allclose(session.stage.scenario.arm.forward(one.scene.q)[1], target[9:], atol=1e-4)
@@ -151,7 +151,7 @@ def test_arms_follow_a_target_from_where_they_are(session):
     arm = session.stage.scenario.arm
     for _ in range(10):
         session.advance(0.1)
-        for one in session.shown():
+        for one in session.views():
             assert ((arm.lower <= one.scene.q) & (one.scene.q <= arm.upper)).all()
 
 
@@ -172,12 +172,12 @@ def test_slow_policies_hold_the_target_back(session, monkeypatch):
         session.advance(0.02)
     np.testing.assert_array_equal(session.reference, start)
     assert session.kept < 0.01
-    assert "keep up with 0%" in session.text(session.shown())
+    assert "keep up with 0%" in session.text(session.views())
 
 
 def test_readings_name_policies_errors_and_limits(session):
     session.scrub(0.04)
-    shown = session.shown()
+    shown = session.views()
     text, reading = session.text(shown), shown[0].reading
     joint = int(np.argmin(reading.margins))
     name = escape_markdown(session.stage.scenario.arm.joint_names[joint])
@@ -193,8 +193,8 @@ def test_privileged_information_plays_only():
     session = Session(Stage.of("varga7-fast", steps=5), ["follow_nominal", "dls"])
     session.aim(moved(session.reference, [0.0, 0.0, 0.01]))
     session.advance(0.003)
-    reference, solver = session.shown()
+    reference, solver = session.views()
     assert reference.status == PLAYS_ONLY
     np.testing.assert_array_equal(reference.scene.q, session.stage.start)
     assert np.abs(solver.scene.q - session.stage.start).max() > 0.0
-    assert "from its limit" not in session.text(session.shown())  # an arm without limits
+    assert "from its limit" not in session.text(session.views())  # an arm without limits
