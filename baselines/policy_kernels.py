@@ -14,7 +14,7 @@ from baselines.status import Status
 from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.kinematics import Chain
-from ikgym.kernels.limits import CHANGE, ideal
+from ikgym.kernels.limits import CHANGE, ideal_velocity
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -239,7 +239,7 @@ def sent_rows(model, q, action, last):
     for row in range(q.shape[0]):
         for j in range(n):
             before = last[row, j]
-            last[row, j] = ideal(limits, j, q[row, j], action[row, j] * limit[j], before, dt)
+            last[row, j] = ideal_velocity(limits, j, q[row, j], action[row, j] * limit[j], before, dt)
             if last.shape[1] > n:
                 last[row, n + j] = last[row, j] - before
 

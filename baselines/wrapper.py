@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
-from baselines.policy.arguments import pack, remembered, replace_rows
+from baselines.policy.arguments import pack, read_memory, replace_rows
 from baselines.spec import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
@@ -80,7 +80,7 @@ class Wrapper(SolverPolicy, abc.ABC):
         """The inner policy's step, see :meth:`SolverPolicy.act`, for its observations and its part of the memory."""
         assert self.inner is not None
         action, state = self.inner.act(batch, memory)
-        return Solution(action * self.inner.problem.velocity_limit, remembered(state), *self.inner.report(state))
+        return Solution(action * self.inner.problem.velocity_limit, read_memory(state), *self.inner.report(state))
 
     def solution(self, qdot: FloatArray, own: Memory, step: Solution) -> Solution:
         """The result of `solve`: status and iterations are those of the inner policy.
@@ -95,7 +95,7 @@ class Wrapper(SolverPolicy, abc.ABC):
     def inner_state(self, state: Memory) -> Memory:
         """The state of the inner policy, as its `predict` would have returned it, in that of the wrapper."""
         size, _ = self._own
-        return pack(*self.report(state), remembered(state)[size:])
+        return pack(*self.report(state), read_memory(state)[size:])
 
     def diagnostics(self, state: Memory) -> dict[str, FloatArray]:
         """Diagnostics of the inner policy."""

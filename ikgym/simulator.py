@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ikgym.arms.limits import limit_rows
 from ikgym.kernels import motions, simulation
-from ikgym.kernels.compilation import announced
+from ikgym.kernels.compilation import announce
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
@@ -95,7 +95,7 @@ class Simulator:
         self._more = [(key, places[key], seen[key].shape) for key in places if key not in OBSERVED]
         self._take_apart()
         self._all, self._own_start = np.ones(rows, dtype=np.bool_), np.zeros(rows, dtype=np.bool_)
-        with announced("the simulation kernels"):
+        with announce("the simulation kernels"):
             simulation.first_not_finite(self._state.q, ~self._all)
             self._run(~self._all, self._new(self._count), moving=False)
 

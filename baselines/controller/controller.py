@@ -16,7 +16,7 @@ from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers, obstacle_rows
 from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
-from baselines.policy.arguments import remembered
+from baselines.policy.arguments import read_memory
 from baselines.policy_kernels import JERK
 from baselines.spec import PolicySpec
 from baselines.status import Status
@@ -256,7 +256,7 @@ class Controller:
         if obstacles is not None:
             batch = batch._replace(obstacles=obstacles[None])
         try:
-            memory = self.policy.initial_memory(1) if self._state is None else remembered(self._state)
+            memory = self.policy.initial_memory(1) if self._state is None else read_memory(self._state)
             action, self._state = self.policy.act(batch, self.policy.recall(memory, self._last[None].copy()))
         except Exception:
             logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)

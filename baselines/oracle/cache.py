@@ -21,7 +21,7 @@ from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.search import VERSION, polish, search
 from baselines.oracle.stripped import ideal, stripped
 from ikgym import scenarios
-from ikgym.kernels.kinematics import stacked
+from ikgym.kernels.kinematics import add_arm_axis
 from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, whole_number
 
@@ -77,7 +77,7 @@ def solve(
         optimum = search(true, seed, how, tick, paths)
     else:
         best = solve(plain, seed, how, cached=cached, tick=tick).q
-        start = plain.shift_start(best, stacked(true.arm.chain))  # a third of the Newton steps from `best` itself
+        start = plain.shift_start(best, add_arm_axis(true.arm.chain))  # a third of the Newton steps from `best` itself
         optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
     if on_disk:
         keep(optimum, scenario, seed, how, arm_seed)

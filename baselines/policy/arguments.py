@@ -43,17 +43,17 @@ def pack(status: npt.NDArray[np.int64], iterations: npt.NDArray[np.int64], memor
     return status, iterations, *memory
 
 
-def remembered(state: Memory) -> Memory:
+def read_memory(state: Memory) -> Memory:
     """The memory in a state, without its names; `SolverPolicy.memory_of` gives it with them."""
     return state[REPORTED:]
 
 
-def signature(example: Memory, rows: int) -> Signature:
-    """Shapes and types of a memory of so many rows, from the memory of one row."""
+def describe_arrays(example: Memory, rows: int) -> Signature:
+    """Shapes and types of a memory of B rows, from the memory of one row."""
     return [((rows, *array.shape[1:]), array.dtype, True) for array in example]
 
 
-def checked_memory(name: str, state: object, expected: Signature, rows: int) -> Memory:
+def check_state(name: str, state: object, expected: Signature, rows: int) -> Memory:
     """The memory in a state that a user hands in, for the policy of a name and B rows.
 
     Arrays that kernels would have to be compiled anew for, such as read-only ones, are copied.
@@ -70,10 +70,10 @@ def checked_memory(name: str, state: object, expected: Signature, rows: int) -> 
                 return tuple(array.copy() for array in memory)
         except AttributeError:  # no arrays
             pass
-    raise _refused(name, state, expected, rows)
+    raise _state_error(name, state, expected, rows)
 
 
-def _refused(name: str, state: object, expected: Signature, rows: int) -> InvalidInputError:
+def _state_error(name: str, state: object, expected: Signature, rows: int) -> InvalidInputError:
     given: object = type(state).__name__
     if isinstance(state, tuple):
         given = [getattr(part, "shape", type(part).__name__) for part in state]
@@ -89,7 +89,7 @@ def _refused(name: str, state: object, expected: Signature, rows: int) -> Invali
     )
 
 
-def truth_values(episode_start: npt.ArrayLike, rows: int) -> npt.NDArray[np.bool_]:
+def read_flags(episode_start: npt.ArrayLike, rows: int) -> npt.NDArray[np.bool_]:
     """Where an episode begins. Shape (B,) or ().
 
     Raises:
@@ -215,10 +215,10 @@ def _extra(observation: Observation, key: str, lead: tuple[int, ...], tail: tupl
 
 def as_batch(parts: Parts, single: bool) -> Batch:
     """A batch from the arrays of an observation."""
-    return taken(parts, None) if single else Batch(*parts)
+    return take_rows(parts, None) if single else Batch(*parts)
 
 
-def taken(parts: Parts, rows: slice | None) -> Batch:
+def take_rows(parts: Parts, rows: slice | None) -> Batch:
     """Some rows of all arrays; None adds an axis of rows."""
     some: list[Any] = [None if part is None else part[rows] for part in parts]
     return Batch(*some)

@@ -80,11 +80,11 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         if self.sees_extras:
             parts, numbers = self._with_obstacles(parts, numbers)
         call(block, numbers, False, parts, (*kept, *last), qdot, counts)
-        return Solution(qdot.reshape(rows, n), self._named(kept), *counts)
+        return Solution(qdot.reshape(rows, n), self._with_names(kept), *counts)
 
     def act(self, batch: Batch, memory: Memory) -> tuple[npt.NDArray[np.float32], Memory]:
         """See :meth:`SolverPolicy.act`; in one call of the kernel, unless threads share out the rows."""
-        if not self._undivided(len(batch.q)):
+        if not self._fits_one_call(len(batch.q)):
             return super().act(batch, memory)
         action, after = self._step(self._flat(batch), len(batch.q), memory, False)
         return action.reshape(batch.q.shape), after
@@ -94,7 +94,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
         if single:
             return self._step(parts, 1, memory, True)
         rows = len(parts[0])
-        if not self._undivided(rows):
+        if not self._fits_one_call(rows):
             return super()._respond(parts, single, memory)
         action, after = self._step(self._flat(parts), rows, memory, True)
         return action.reshape(parts[0].shape), after

@@ -15,12 +15,12 @@ from ikgym.kernels.threads import in_chunks
 _sharing = threading.local()
 
 
-def undivided(rows: int, grain: int) -> bool:
-    """Whether so many rows are solved in one call; ``grain`` rows are worth a thread."""
+def fits_one_call(rows: int, grain: int) -> bool:
+    """Whether B rows are solved in one call; ``grain`` rows are worth a thread."""
     return rows < 2 * grain or getattr(_sharing, "now", False)
 
 
-def divided(solve: Callable[[slice], Solution], rows: int, grain: int) -> Solution:
+def divide_rows(solve: Callable[[slice], Solution], rows: int, grain: int) -> Solution:
     """The solution of all rows, each thread solving a part of at least ``grain`` rows."""
     parts: dict[int, Solution] = {}
 

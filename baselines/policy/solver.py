@@ -19,20 +19,20 @@ from baselines.policy.arguments import (
     Report,
     Signature,
     as_batch,
-    checked_memory,
+    check_state,
+    describe_arrays,
     not_finite,
     pack,
-    remembered,
+    read_flags,
+    read_memory,
     replace_rows,
-    signature,
-    taken,
-    truth_values,
+    take_rows,
 )
 from baselines.policy.problem import Problem
-from baselines.policy.sharing import divided, undivided
+from baselines.policy.sharing import divide_rows, fits_one_call
 from baselines.policy_kernels import Batch, Memory, Solution, all_finite, begin_rows, cut_rows, sent_rows
 from ikgym.frozen import Frozen
-from ikgym.kernels.compilation import announced
+from ikgym.kernels.compilation import announce
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
@@ -69,11 +69,11 @@ class SolverPolicy(Frozen, abc.ABC):
     keeps_jerk: ClassVar[bool] = False
     #: Whether `predict` accepts the observations of several arms at once.
     batched: ClassVar[bool] = True
-    #: Rows that are worth a thread of their own: the fewer, the longer a row takes.
+    #: Rows that are worth a thread: the fewer, the longer a row takes.
     grain: ClassVar[int] = 256
-    #: The parameter that stands alone behind the name, as in ``"agent:PATH"``; None where all of them have to be named.
+    #: The parameter that may be given without its name, as in ``"agent:PATH"``; None where there is none.
     positional: ClassVar[str | None] = None
-    #: Parameters without which nobody can tell whether the policy suits a scenario.
+    #: Parameters that decide whether the policy suits a scenario.
     decisive: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -183,7 +183,7 @@ class SolverPolicy(Frozen, abc.ABC):
         Args:
             observation: As the environment gives it; single, or all arrays with a leading batch axis B. Its
                 ``nominal`` must show the steps 1, 2, … ahead, or just those of :attr:`preview` where that is a tuple:
-                an environment made with another tuple shows others, which no policy can tell from these.
+                an environment made with another tuple shows others, which no policy can distinguish from these.
             state: State that the last call returned; None at the first.
             episode_start: True where an episode begins, and the memory is to be cleared. Shape (B,).
             deterministic: Changes nothing; solvers do not draw at random.
@@ -239,8 +239,8 @@ class SolverPolicy(Frozen, abc.ABC):
 
     def memory_of(self, state: Memory) -> Memory:
         """The memory in a state that `predict` returned: the named tuple of :meth:`memory`, where it gives one."""
-        memory = remembered(state)
-        return self._named(memory[:-1] if self.remembers_command else memory)
+        memory = read_memory(state)
+        return self._with_names(memory[:-1] if self.remembers_command else memory)
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
         """A memory, cleared in the rows where an episode begins. Shape (B,)."""
@@ -270,13 +270,13 @@ class SolverPolicy(Frozen, abc.ABC):
         return replace_rows(memory, self.initial_memory(len(lost)), lost) if memory else memory
 
     def _recall(self, state: Memory | None, episode_start: npt.ArrayLike | None, rows: int) -> Memory:
-        starting = None if episode_start is None else truth_values(episode_start, rows)
+        starting = None if episode_start is None else read_flags(episode_start, rows)
         if state is None:
             return self.initial_memory(rows)
         if state is self._last[0] and len(state[0]) == rows:
             memory = state[REPORTED:]
         else:
-            memory = checked_memory(self.name, state, self._signature(rows), rows)
+            memory = check_state(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():
             return memory
         return self.restarted(memory, np.broadcast_to(starting, (rows,)))
@@ -288,26 +288,26 @@ class SolverPolicy(Frozen, abc.ABC):
 
     @functools.cached_property
     def _signature(self) -> Callable[[int], Signature]:
-        """Specification of the memory of so many rows; cached, since `predict` often has as many again."""
-        return functools.lru_cache(16)(functools.partial(signature, self.initial_memory(1)))
+        """Specification of the memory of B rows; cached, since `predict` often has the same number again."""
+        return functools.lru_cache(16)(functools.partial(describe_arrays, self.initial_memory(1)))
 
     @functools.cached_property
     def _example(self) -> Memory:
         """The memory of one row, for its shapes and its type."""
         return self.memory(1)
 
-    def _undivided(self, rows: int) -> bool:
-        return undivided(rows, self.grain)
+    def _fits_one_call(self, rows: int) -> bool:
+        return fits_one_call(rows, self.grain)
 
     @classmethod
     @contextlib.contextmanager
     def _first_call(cls) -> Iterator[None]:
         """Announces the compilation that the first call of a class does."""
         compiled_classes.add(cls)
-        with announced(f"the policy {cls.name}"):
+        with announce(f"the policy {cls.name}"):
             yield
 
-    def _named(self, memory: Memory) -> Memory:
+    def _with_names(self, memory: Memory) -> Memory:
         """The memory as the named tuple that :meth:`memory` gives, where it gives one."""
         kind: Any = type(self._example)
         return memory if type(memory) is kind or kind is tuple else kind._make(memory)
@@ -315,14 +315,14 @@ class SolverPolicy(Frozen, abc.ABC):
     def _solve(self, batch: Batch, memory: Memory) -> Solution:
         """The solution of all rows; where they are many, several threads share them out."""
         policy, rows = type(self), len(batch.q)
-        memory = self._named(memory)
+        memory = self._with_names(memory)
         if policy not in compiled_classes:  # the first solve has to compile
             with self._first_call():
                 return self.solve(batch, memory)
-        if self._undivided(rows):
+        if self._fits_one_call(rows):
             return self.solve(batch, memory)
 
         def share(part: slice) -> Solution:
-            return self.solve(taken(batch, part), self._named(tuple(array[part] for array in memory)))
+            return self.solve(take_rows(batch, part), self._with_names(tuple(array[part] for array in memory)))
 
-        return divided(share, rows, self.grain)
+        return divide_rows(share, rows, self.grain)

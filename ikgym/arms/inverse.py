@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.compilation import announced
+from ikgym.kernels.compilation import announce
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
-from ikgym.kernels.kinematics import Chain, forward_rows, stacked
+from ikgym.kernels.kinematics import Chain, add_arm_axis, forward_rows
 from ikgym.kernels.threads import in_chunks
 from ikgym.validation import BoolArray, FloatArray, ending, number, rotation_matrices, whole_number
 
@@ -53,14 +53,14 @@ def inverse(
         arm.check_posture("start", starts)
     lead = _lead(rotations.shape, positions.shape, starts.shape)
     targets = _rows(rotations, lead, 2), _rows(positions, lead, 1), _rows(starts, lead, 1)
-    constants = *stacked(arm.chain), *ranges, *settings
+    constants = *add_arm_axis(arm.chain), *ranges, *settings
     q, converged = np.empty((len(targets[1]), arm.joints)), np.empty(len(targets[1]), dtype=np.bool_)
 
     def work(first: int, last: int) -> None:
         inverse_rows(*constants, *(array[first:last] for array in (*targets, q, converged)))
 
     # A look takes less time than a timer that is never needed.
-    with nullcontext() if getattr(inverse_rows, "overloads", True) else announced("the inverse kinematics"):
+    with nullcontext() if getattr(inverse_rows, "overloads", True) else announce("the inverse kinematics"):
         in_chunks(work, len(q), GRAIN)
     return q.reshape(*lead, arm.joints), converged.reshape(lead)[()]
 

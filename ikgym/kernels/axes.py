@@ -81,7 +81,7 @@ def direction_error_jacobian(nominal, actual, jacobian, out):
     Args:
         nominal: z*. Shape (3,), or longer.
         actual: z. Shape (3,), or longer.
-        jacobian: Angular velocities of z along its own two directions across. Shape (2, n).
+        jacobian: Angular velocities of z along the two directions across it. Shape (2, n).
         out: Receives the derivative. Shape (2, n).
     """
     first, second, cosine = _parts(nominal, actual)

@@ -13,14 +13,14 @@ logger = logging.getLogger("ikgym")
 
 
 @contextlib.contextmanager
-def announced(what: str, patience: float = 2.0) -> Iterator[None]:
-    """Says so if the block takes long.
+def announce(what: str, patience: float = 2.0) -> Iterator[None]:
+    """Warns if the block takes long, as when kernels are compiled.
 
     Args:
         what: Name of the compiled part.
-        patience: Time after which the user is told, in [s].
+        patience: Time after which the warning is logged, in [s].
     """
-    timer = threading.Timer(patience, _tell, [what])
+    timer = threading.Timer(patience, _warn, [what])
     timer.daemon = True
     timer.start()
     try:
@@ -29,7 +29,7 @@ def announced(what: str, patience: float = 2.0) -> Iterator[None]:
         timer.cancel()
 
 
-def _tell(what: str) -> None:
+def _warn(what: str) -> None:
     if jit.kept_on_disk():
         logger.warning("Compiling %s; this happens once, the machine code is kept on disk.", what)
     else:

@@ -21,7 +21,7 @@ class Chain(NamedTuple):
 
     Attributes:
         offsets: From the frame of the joint before to the joint, in [m]. Shape (n, 3).
-        axes: Unit vectors in the joints' own frames. Shape (n, 3).
+        axes: Unit vectors in the frames of the joints. Shape (n, 3).
         prismatic: True where a joint is prismatic. Shape (n,).
         tool: Tool point in the last frame, in [m]. Shape (3,).
         tool_rotation: Orientation of the tool in the last frame. Shape (3, 3).
@@ -34,7 +34,7 @@ class Chain(NamedTuple):
     tool_rotation: npt.NDArray[np.float64]
 
 
-def stacked(chain: Chain) -> Chain:
+def add_arm_axis(chain: Chain) -> Chain:
     """An arm with a leading axis of 1 for arms, one for all poses; ``prismatic`` has none."""
     offsets, axes, prismatic, tool, tool_rotation = chain
     return Chain(offsets[None], axes[None], prismatic, tool[None], tool_rotation[None])
@@ -69,7 +69,7 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):
     for i in range(q.shape[0]):
         if chain.prismatic[i]:
             continue
-        # The walk left the joint's own point in the linear rows: v = axis × (tool - joint).
+        # The walk left the point of the joint in the linear rows: v = axis × (tool - joint).
         x = position[0] - jacobian[0, i]
         y = position[1] - jacobian[1, i]
         z = position[2] - jacobian[2, i]
@@ -81,7 +81,7 @@ def forward_and_jacobian(chain, q, rotation, position, jacobian):
 
 @inlined
 def _walk(chain, q, rotation, position, jacobian, keep):
-    """Goes along the chain; if told to keep them, leaves each joint's axis and point in ``jacobian``."""
+    """Forward pass along the chain; ``keep`` stores the axis and the point of each joint in ``jacobian``."""
     offsets, axes, prismatic = chain.offsets, chain.axes, chain.prismatic
     # The orientation so far is kept in nine scalars, which stay in registers; an array would not.
     r00, r01, r02 = 1.0, 0.0, 0.0

@@ -14,20 +14,20 @@ SLACK = 1e-6
 
 
 @inlined
-def within(value, bound):
+def clip(value, bound):
     """The value, no further from 0 than the bound."""
     return math.copysign(bound, value) if abs(value) > bound else value
 
 
 @inlined
-def changed(limits, j, velocity, last):
+def limit_change(limits, j, velocity, last):
     """A velocity of joint ``j`` within its acceleration limit, in [rad/s] or [m/s]; ``last`` is that of before."""
     most, change = limits[CHANGE, j], velocity - last
     return last + math.copysign(most, change) if abs(change) > most else velocity
 
 
 @inlined
-def driven(limits, j, command, last, slack, at_limit, row):
+def limit_command(limits, j, command, last, slack, at_limit, row):
     """The velocity that joint ``j`` is driven at: the command within the limits of velocity and acceleration.
 
     Args:
@@ -39,15 +39,15 @@ def driven(limits, j, command, last, slack, at_limit, row):
         at_limit: Joints held back; those by velocity and by acceleration are counted on. Shape (N, 3).
         row: The arm.
     """
-    allowed = within(command, limits[FASTEST, j])
-    velocity = changed(limits, j, allowed, last)
+    allowed = clip(command, limits[FASTEST, j])
+    velocity = limit_change(limits, j, allowed, last)
     at_limit[row, 1] += abs(command - allowed) > slack
     at_limit[row, 2] += abs(allowed - velocity) > slack
     return velocity
 
 
 @inlined
-def stopped(limits, j, here, reached, dt):
+def stop_at_limit(limits, j, here, reached, dt):
     """Final coordinate of joint ``j``, which would pass a stop, and the velocity that leads there.
 
     Args:
@@ -61,11 +61,11 @@ def stopped(limits, j, here, reached, dt):
         The stop in [rad] or [m], and the velocity in [rad/s] or [m/s].
     """
     stop = limits[LOWER, j] if reached < limits[LOWER, j] else limits[UPPER, j]
-    return stop, within((stop - here) / dt, limits[FASTEST, j])
+    return stop, clip((stop - here) / dt, limits[FASTEST, j])
 
 
 @inlined
-def ideal(limits, j, here, command, last, dt):
+def ideal_velocity(limits, j, here, command, last, dt):
     """The velocity of joint ``j`` after a step of an ideal plant, in [rad/s] or [m/s].
 
     Args:
@@ -78,8 +78,8 @@ def ideal(limits, j, here, command, last, dt):
     """
     if limits.shape[0] == 0:
         return command
-    velocity = changed(limits, j, within(command, limits[FASTEST, j]), last)
+    velocity = limit_change(limits, j, clip(command, limits[FASTEST, j]), last)
     reached = here + dt * velocity
     if not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-        _, velocity = stopped(limits, j, here, reached, dt)
+        _, velocity = stop_at_limit(limits, j, here, reached, dt)
     return velocity

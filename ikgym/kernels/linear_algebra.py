@@ -1,6 +1,6 @@
 """Kernels of linear algebra for the small matrices of one arm.
 
-numba's own `np.linalg` needs SciPy and allocates at every call; at six rows neither pays.
+`np.linalg` in numba needs SciPy and allocates at every call; at six rows neither pays.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 from ikgym.kernels.jit import inlined, inner, kernel
 
 # Pivots below this share of the largest diagonal element are rounding: J has lost rank, or nearly so, and λ is too
-# small to count. Singular values tell which; solving on would amplify the rounding.
+# small to count. Singular values show which; to solve on would amplify the rounding.
 SMALLEST_PIVOT = 1e-12
 
 
 @inlined
 def dot(a, b):
-    """The scalar product; written out, since numba's own needs SciPy."""
+    """The scalar product; written out, since that of numba needs SciPy."""
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]

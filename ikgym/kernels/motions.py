@@ -75,7 +75,7 @@ def _at(motion, time, duration, out):
 
 @kernel
 def motion_rows(motions, times, duration, out):
-    """Several motions, each at times of its own.
+    """Several motions, each at different times.
 
     Args:
         motions: Control points of splines; or amplitudes, frequencies, phases and offsets of sinusoids. (k, c, n).

@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
         true_q: Joint coordinates in [rad] or [m]. Shape (N, n).
         true_pose: Task coordinates. Shape (N, m).
         clearance: Smallest signed distance between bodies in [m]; infinite where nothing can meet. Shape (N,).
-        stopped: 1 where bodies have touched and the arm stands still, 0 elsewhere. Shape (N,).
+        stopped: 1 where bodies have touched and the arm has been stopped, 0 elsewhere. Shape (N,).
         pair: The nearest pair: a body, and another body or the number of bodies plus that of an obstacle; the pair that
             touched at the step of a stop; -1 where nothing can meet. Shape (N, 2).
         proximity_cost: Φ^C, 0 where the step does not count. Shape (N,), or (N, 0) where bodies cannot touch and the

@@ -8,14 +8,14 @@ import numpy as np
 
 from ikgym.kernels.jit import inlined, kernel
 
-#: Normal numbers are cut at so many standard deviations, which one in five hundred million exceeds.
+#: Normal numbers are cut at this number of standard deviations, which one in five hundred million exceeds.
 CUT = 6.0
 # The share of a normal distribution below −6 standard deviations.
 BEYOND = 9.865876450376981e-10
 
 
 @inlined
-def _mixed(z):
+def _mix(z):
     """The output function of SplitMix64 (Steele, Lea and Flood 2014)."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -24,13 +24,13 @@ def _mixed(z):
 
 @kernel
 def stream(key, number):
-    """The key of a stream of its own: one of many that a key has.
+    """The key of one of the many independent streams of a key.
 
     Args:
         key: A key, 64 bits.
         number: Which stream, counted from 0.
     """
-    return _mixed(_mixed(np.uint64(key)) ^ ((np.uint64(number) + np.uint64(1)) * np.uint64(0xD1B54A32D192ED03)))
+    return _mix(_mix(np.uint64(key)) ^ ((np.uint64(number) + np.uint64(1)) * np.uint64(0xD1B54A32D192ED03)))
 
 
 @kernel
@@ -39,7 +39,7 @@ def uniform(key, counter):
 
     The output function of SplitMix64 (Steele, Lea and Flood 2014), whose state is the counter itself.
     """
-    z = _mixed(np.uint64(key) + (np.uint64(counter) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15))
+    z = _mix(np.uint64(key) + (np.uint64(counter) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15))
     return 2.0 * (np.float64(z >> np.uint64(11)) * 2.0**-53) - 1.0
 
 

@@ -152,7 +152,7 @@ def show_row(constants, cost, state, row, pose, frame, shown):
 
 
 @inlined
-def commanded(action, velocity_limit, clipped, row):
+def to_command(action, velocity_limit, clipped, row):
     """The command of an action in [rad/s] or [m/s]; outside the box it is clipped, and ``clipped`` (N,) is set."""
     if abs(action) > 1.0:
         clipped[row] = 1.0

@@ -79,7 +79,7 @@ def error(kind, nominal, coordinates, out):
         kind: One of POSITION, SKEW, MATRIX, POSE and AXIS.
         nominal: Nominal coordinates. Shape (m,).
         coordinates: Coordinates. Shape (m,).
-        out: Receives the error. Shape (e,): the difference of the coordinates, but for POSE the position
+        out: Receives the error. Shape (e,): the difference of the coordinates; for POSE the position
             error in [m], then the rotation vector of R* Rᵀ in [rad] (Zhang 2020, eq. 51-54), and for AXIS the
             position error, then that of the direction, see :func:`ikgym.kernels.axes.direction_error`.
     """

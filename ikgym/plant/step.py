@@ -12,9 +12,9 @@ from ikgym.kernels.bodies.proximity import proximity
 from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
-from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, driven, stopped, within
+from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, clip, limit_command, stop_at_limit
 from ikgym.kernels.outcome import OBSTACLE, more_parts, more_size, parts, size
-from ikgym.kernels.simulation import Constants, Floats, Integers, State, commanded, show_row
+from ikgym.kernels.simulation import Constants, Floats, Integers, State, show_row, to_command
 from ikgym.kernels.tasks import error_size
 from ikgym.plant.contact import measure, place_of_boxes, touches
 from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, hold, remembered, shaped, swung
@@ -281,7 +281,7 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
     q, qdot, limited = state.q, state.qdot, constants.limits.shape[0] > 0
     n, now = q.shape[1], state.step[row]
     for j in range(n):
-        applied = commanded(state.actions[row, j], velocity_limit[j], clipped, row)
+        applied = to_command(state.actions[row, j], velocity_limit[j], clipped, row)
         if len(plant) > 0:
             plant.commands[row, now % plant.commands.shape[1], j] = applied
             arrived = now - plant.delay[row, j]
@@ -290,7 +290,7 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
                 applied += drives.fraction[j] * (remembered(plant.commands, row, arrived - 1, j) - applied)
         slack = SLACK * velocity_limit[j]
         if limited:
-            applied = driven(limits, j, applied, qdot[row, j], slack, at_limit, row)
+            applied = limit_command(limits, j, applied, qdot[row, j], slack, at_limit, row)
         velocity = applied
         if len(plant) > 0:
             if plant.lag[row, j] < 1.0:
@@ -307,7 +307,7 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
                 way = swung(drives.free, plant.swing, row, j, way, dt)
         reached = q[row, j] + way  # Varga 2021, eq. 5
         if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
-            reached, applied = stopped(limits, j, q[row, j], reached, dt)
+            reached, applied = stop_at_limit(limits, j, q[row, j], reached, dt)
             at_limit[row, 0] += abs(velocity - applied) > slack
             if len(plant) > 0:
                 hold(plant, row, j, applied, drives.gain[j])
@@ -320,7 +320,7 @@ def _recall(limits, commands, row, now, out):
     for i in range(out.shape[1]):
         for j in range(out.shape[2]):
             command = remembered(commands, row, now - 1 - i, j)
-            out[row, i, j] = within(command, limits[FASTEST, j]) if limits.shape[0] > 0 else command
+            out[row, i, j] = clip(command, limits[FASTEST, j]) if limits.shape[0] > 0 else command
 
 
 @inlined

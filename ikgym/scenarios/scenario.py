@@ -20,7 +20,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.bodies import Surroundings
-from ikgym.kernels.kinematics import Chain, stacked
+from ikgym.kernels.kinematics import Chain, add_arm_axis
 from ikgym.kernels.rotations import geodesic_angle, quaternion_of
 from ikgym.kernels.simulation import nominal_rows
 from ikgym.obstacles import MOST_OBSTACLES, Obstacle, random_boxes
@@ -327,7 +327,7 @@ class Scenario(Frozen):
         q = self.first_q(self.episode(seed))
         if not self.shifts_start:
             return q
-        start: FloatArray = self.shift_start(q[None], stacked(self.drawn_plant(seed, arm_seed).arm.chain))[0]
+        start: FloatArray = self.shift_start(q[None], add_arm_axis(self.drawn_plant(seed, arm_seed).arm.chain))[0]
         return start
 
     @functools.cached_property

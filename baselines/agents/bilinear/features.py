@@ -22,7 +22,7 @@ import numpy as np
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.kernels.limits import within
+from ikgym.kernels.limits import clip
 from ikgym.kernels.linear_algebra import damped_step
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 
@@ -156,7 +156,7 @@ def rate_rows(kind, chain, dt, offsets, q, nominal, speed, features):
             if not damped_step(jacobian[:w], due, DAMPING, gram, scratch, step):
                 step[:] = np.nan  # an unknown rate must not fill_kinematics like a rate of 0
             for j in range(n):
-                step[j] = within(step[j], FARTHEST)
+                step[j] = clip(step[j], FARTHEST)
                 posture[j] += step[j]
                 if i > 0:
                     unit = (offsets[i] - offsets[i - 1]) * dt * speed[row]

@@ -20,7 +20,7 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import P_X_INSIDE
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER, within
+from ikgym.kernels.limits import CHANGE, FASTEST, LOWER, UPPER, clip
 from ikgym.rl.twists import (
     error_gradient,
     error_kind,
@@ -195,11 +195,11 @@ def limits_gradient(limits, velocity_limit, j, command, move, by, dt):
     by_last, passes = 0.0, abs(command) <= velocity_limit[j]
     if limits.shape[0] == 0:
         return (dt * lambda_ + mu if passes else 0.0), lambda_, by_last
-    allowed = within(command, velocity_limit[j])
+    allowed = clip(command, velocity_limit[j])
     passes = passes and abs(allowed) <= limits[FASTEST, j]
-    allowed = within(allowed, limits[FASTEST, j])
+    allowed = clip(allowed, limits[FASTEST, j])
     accelerates = abs(allowed - last) <= limits[CHANGE, j]
-    velocity = allowed if accelerates else last + within(allowed - last, limits[CHANGE, j])
+    velocity = allowed if accelerates else last + clip(allowed - last, limits[CHANGE, j])
     if not limits[LOWER, j] <= here + dt * velocity <= limits[UPPER, j]:
         at_rest = abs(reached - here) / dt <= limits[FASTEST, j]
         return 0.0, (-mu / dt if at_rest else 0.0), by_last

@@ -15,7 +15,7 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import inlined, kernel
 from ikgym.kernels.kinematics import Chain, forward
-from ikgym.kernels.limits import LOWER, UPPER, driven, stopped, within
+from ikgym.kernels.limits import LOWER, UPPER, clip, limit_command, stop_at_limit
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
 from ikgym.scenarios import Scenario
 
@@ -122,12 +122,12 @@ def segment(task, rows, output, path, start, stop):
                 turn(axis, -q[0], due)
             for j in range(n):
                 command = joint_command(output[row], j, due, speed[row], dt)
-                applied[j] = within(command, velocity_limit[j])
+                applied[j] = clip(command, velocity_limit[j])
                 if limited:
-                    applied[j] = driven(limits, j, applied[j], qdot[j], 0.0, held, 0)
+                    applied[j] = limit_command(limits, j, applied[j], qdot[j], 0.0, held, 0)
                 reached[j] = q[j] + dt * applied[j]
                 if limited and not limits[LOWER, j] <= reached[j] <= limits[UPPER, j]:
-                    reached[j], applied[j] = stopped(limits, j, q[j], reached[j], dt)
+                    reached[j], applied[j] = stop_at_limit(limits, j, q[j], reached[j], dt)
             forward(chain, reached, rotation, position)
             task_kernels.coordinates(kind, rotation, position, pose)
             task_kernels.error(kind, target, pose, error[:e])

@@ -22,7 +22,7 @@ def _self_bound(shapes, placed, first, second):
 
 @inlined
 def _bound(shapes, placed, body, box):
-    """The same of a body and an obstacle that is no half-space; how deep the middle is inside is taken, too."""
+    """Like :func:`_self_bound` for a body and a box; includes the penetration depth of the centre."""
     x, y, z = into_box(box, placed[body, 6], placed[body, 7], placed[body, 8])
     x, y, z = abs(x) - box[12], abs(y) - box[13], abs(z) - box[14]
     inside = min(max(x, y, z), 0.0)

@@ -14,7 +14,7 @@ from ikgym.kernels.random_numbers import share, stream, uniform
 
 Floats = npt.NDArray[np.float64]
 
-#: A box is drawn at most so many times.
+#: Most attempts to draw a box.
 TRIES = 1000
 # Steps that are looked at first.
 FIRST = 33

@@ -15,7 +15,7 @@ MEETING = 1e-12
 
 
 @inlined
-def _clamped(value):
+def _clamp(value):
     return min(max(value, 0.0), 1.0)
 
 
@@ -30,18 +30,18 @@ def between_segments(ax, ay, az, ux, uy, uz, bx, by, bz, vx, vy, vz):
     a, b, c = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
     d, e = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
     if a == 0.0:
-        return 0.0, _clamped(e / c) if c > 0.0 else 0.0
+        return 0.0, _clamp(e / c) if c > 0.0 else 0.0
     if c == 0.0:
-        return _clamped(-d / a), 0.0
+        return _clamp(-d / a), 0.0
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     mx, my, mz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
     determinant = nx * nx + ny * ny + nz * nz
-    s = _clamped((nx * mx + ny * my + nz * mz) / determinant) if determinant > 0.0 else 0.0
+    s = _clamp((nx * mx + ny * my + nz * mz) / determinant) if determinant > 0.0 else 0.0
     t = (b * s + e) / c
     if t < 0.0:
-        return _clamped(-d / a), 0.0
+        return _clamp(-d / a), 0.0
     if t > 1.0:
-        return _clamped((b - d) / a), 1.0
+        return _clamp((b - d) / a), 1.0
     return s, t
 
 
@@ -96,7 +96,7 @@ def _slope(t, px, py, pz, dx, dy, dz, hx, hy, hz):
 
 
 @inlined
-def _narrowed(low, high, at_low, at_high, p, d, bound, ray, half):
+def _narrow(low, high, at_low, at_high, p, d, bound, ray, half):
     """The interval that has the minimum, cut where the segment passes a face: the slope is linear in between."""
     if d == 0.0:
         return low, high, at_low, at_high
@@ -121,9 +121,9 @@ def _nearest_to_box(px, py, pz, dx, dy, dz, hx, hy, hz):
         return 1.0
     low, high = 0.0, 1.0
     for sign in (-1.0, 1.0):
-        low, high, at_low, at_high = _narrowed(low, high, at_low, at_high, px, dx, sign * hx, ray, half)
-        low, high, at_low, at_high = _narrowed(low, high, at_low, at_high, py, dy, sign * hy, ray, half)
-        low, high, at_low, at_high = _narrowed(low, high, at_low, at_high, pz, dz, sign * hz, ray, half)
+        low, high, at_low, at_high = _narrow(low, high, at_low, at_high, px, dx, sign * hx, ray, half)
+        low, high, at_low, at_high = _narrow(low, high, at_low, at_high, py, dy, sign * hy, ray, half)
+        low, high, at_low, at_high = _narrow(low, high, at_low, at_high, pz, dz, sign * hz, ray, half)
     return low - at_low * (high - low) / (at_high - at_low)
 
 
@@ -170,7 +170,7 @@ def into_box(box, x, y, z):
 
 
 @inlined
-def _pushed(best, nx, ny, nz, ray, half):
+def _push(best, nx, ny, nz, ray, half):
     """The shortest way apart, where a direction and its opposite are looked at, too.
 
     ``best`` holds the signed distance, the direction, and the parameter of the point that is deepest.
@@ -196,7 +196,7 @@ def _pushed_across(best, ex, ey, ez, ray, half):
     if length < MEETING:
         return best
     before = best[0]
-    best = _pushed(best, nx / length, ny / length, nz / length, ray, half)
+    best = _push(best, nx / length, ny / length, nz / length, ray, half)
     if best[0] > before:
         # The edge is on the side that the segment is pushed to.
         cx, cy, cz = math.copysign(half[0], best[1]), math.copysign(half[1], best[2]), math.copysign(half[2], best[3])
@@ -212,9 +212,9 @@ def _inside(px, py, pz, dx, dy, dz, hx, hy, hz):
     """Signed distance, direction and parameter of a segment that meets a box, by all faces of their difference."""
     ray, half = (px, py, pz, dx, dy, dz), (hx, hy, hz)
     best = (-math.inf, 0.0, 0.0, 1.0, 0.0)
-    best = _pushed(best, 1.0, 0.0, 0.0, ray, half)
-    best = _pushed(best, 0.0, 1.0, 0.0, ray, half)
-    best = _pushed(best, 0.0, 0.0, 1.0, ray, half)
+    best = _push(best, 1.0, 0.0, 0.0, ray, half)
+    best = _push(best, 0.0, 1.0, 0.0, ray, half)
+    best = _push(best, 0.0, 0.0, 1.0, ray, half)
     best = _pushed_across(best, 1.0, 0.0, 0.0, ray, half)
     best = _pushed_across(best, 0.0, 1.0, 0.0, ray, half)
     return _pushed_across(best, 0.0, 0.0, 1.0, ray, half)

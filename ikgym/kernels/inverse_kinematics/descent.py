@@ -26,9 +26,9 @@ def descend(chain, ranges, pose, settings, work):
     for left in range(STEPS, -1, -1):
         forward_and_jacobian(chain, work.q, work.rotation, work.position, work.jacobian)
         pose_error(pose, settings.length, work)
-        if met(work.error, settings):
+        if is_reached(work.error, settings):
             return
-        error = squared(work.error)
+        error = square_length(work.error)
         waited += 1
         if error < PROGRESS * milestone:
             milestone, waited = error, 0
@@ -114,7 +114,7 @@ def _row(row, rotation):
 
 
 @inlined
-def met(error, settings):
+def is_reached(error, settings):
     """Whether position and orientation both are within the tolerance."""
     most = settings.tolerance * settings.tolerance
     if not error[0] * error[0] + error[1] * error[1] + error[2] * error[2] <= most:
@@ -133,7 +133,7 @@ def copy(vector, out):
 
 
 @inlined
-def squared(vector):
+def square_length(vector):
     """The squared length of a vector."""
     total = 0.0
     for i in range(vector.shape[0]):

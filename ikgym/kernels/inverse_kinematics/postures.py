@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ikgym.kernels.inverse_kinematics.descent import copy, descend, met, pose_error, squared
+from ikgym.kernels.inverse_kinematics.descent import copy, descend, is_reached, pose_error, square_length
 from ikgym.kernels.inverse_kinematics.numbers import Ranges, Settings, Work
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
@@ -39,7 +39,7 @@ def inverse_rows(
     """Joint coordinates for N poses, each worked out by itself.
 
     The first arguments are a :class:`ikgym.kernels.kinematics.Chain`, :class:`Ranges` and :class:`Settings`. The arrays
-    of the chain, but for ``prismatic``, have a leading axis for arms: N of them, or one for all poses.
+    of the chain, except ``prismatic``, have a leading axis for arms: N of them, or one for all poses.
     ``rotation`` (N, 3, 3), of shape (N, 0, 0) where orientations do not matter, and ``position`` (N, 3) in [m] are the
     poses of the tool in the base frame, ``start`` (N, n) is where to begin, within the limits. ``q`` (N, n) receives
     the joint coordinates, the nearest that were found where the pose is not met, and ``converged`` (N,) whether it is.
@@ -76,11 +76,11 @@ def _inverse(chain, ranges, pose, start, settings, work, q):
         if _unwind(chain.prismatic, ranges, start, work.q):
             forward(chain, work.q, work.rotation, work.position)
             pose_error(pose, settings.length, work)
-        error = squared(work.error)
+        error = square_length(work.error)
         if error < best:
             best = error
             copy(work.q, q)
-        if met(work.error, settings):
+        if is_reached(work.error, settings):
             return True
     return False
 
