@@ -63,7 +63,6 @@ _import_paths: dict[str, str] = {
 #: Policies that need parameters, or suit some scenarios only, so that `all` leaves them out.
 _incomplete: dict[str, str] = {
     "agent": "baselines.agents.policy:Agent",
-    "planned": "baselines.paths.planned:Planned",
     "published": f"{_SOLVERS}.references.published:Published",
     "told": f"{_SOLVERS}.references.told:Told",
 }

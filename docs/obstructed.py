@@ -2,7 +2,7 @@
 
 `obstructed_paths.csv` has a line for each problem, and the table its sums. A line that stands there is not measured
 again. The start is free: `qp` plays from up to a hundred postures at the first pose, `rhc_foresight` from the start
-that `planned` has. The joint velocities of both are limited to 7° a waypoint.
+of the planned path. The joint velocities of both are limited to 7° a waypoint.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ikgym.validation import FloatArray
 PATHS = "obstructed_paths"
 #: Sets of problems by the beginnings of their names.
 SETS = {"RL-ITG, drawn": "rlitg-s", "RL-ITG, random": "rlitg-obstacle", "CppFlow": "cppflow"}
-#: Columns of the table: what passes.
+#: Columns of the table: the planned path, solvers, and the trajectory that was published.
 POLICIES = ("planned", "qp", "rhc_foresight", "published")
 #: Steps from waypoint to waypoint, most postures from which `qp` begins, and a finer search where there is no way.
 STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500})
@@ -45,8 +45,8 @@ def line(name: str) -> Line:
         found = route(scenario, FINE)
     whole = len(found) == poses
     out: Line = {"problem": name, "poses": poses, "reached": len(found), "without_collisions": len(free)}
-    for policy in ("planned", "rhc_foresight"):
-        out[policy] = int(judged(scenario, found[0], policy).passed) if whole else 0
+    out["planned"] = int(whole and verdict(scenario, found).passed)
+    out["rhc_foresight"] = int(whole and judged(scenario, found[0]).passed)
     passed, starts = among_starts(scenario)
     out |= {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
     theirs = [verdict(scenario, problems.trajectory(name, method)) for method in problems.published(name)]
@@ -62,15 +62,10 @@ def route(scenario: Scenario, search: Mapping[str, Any] = MappingProxyType({})) 
     return Routes(scenario, scenario.times(scenario.steps + 1)[::STRIDE], largest, **search).route()
 
 
-def judged(scenario: Scenario, start: FloatArray, policy: str) -> Verdict:
-    """How a policy follows from a start."""
-    begun = scenario.replace(start=start)
-    if policy == "planned":
-        played = baselines.make(policy, begun, largest=TURN)
-    else:
-        begun = slow(begun)
-        played = baselines.make(policy, begun)
-    outcome = rollout(begun, played, 0, timed=False)
+def judged(scenario: Scenario, start: FloatArray) -> Verdict:
+    """How `rhc_foresight` follows from a start."""
+    begun = slow(scenario.replace(start=start))
+    outcome = rollout(begun, baselines.make("rhc_foresight", begun), 0, timed=False)
     return verdict(scenario, np.vstack([start, outcome.q[STRIDE - 1 :: STRIDE]]))
 
 

@@ -63,7 +63,7 @@ class Retimed:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Candidate:
+class Candidate:
     """A timing that a solver follows from a start; with the motion."""
 
     branch: Branch
@@ -101,22 +101,23 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float
 
 def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
     """The result of :func:`retime`; None where no start leads along the whole path, or no solver follows from any."""
-    best = _best(found, FOLLOWED, fastest)
+    best = best_candidate(found, FOLLOWED, fastest)
     if fastest or best is None or best.timing.duration > found.duration:
         for solver in with_slow_joints_spared(found.scenario):
-            other = _best(survey(found.scenario, reserve=found.reserve, solver=solver), FOLLOWED, fastest)
+            other = best_candidate(survey(found.scenario, reserve=found.reserve, solver=solver), FOLLOWED, fastest)
             if other and (best is None or other.timing.duration < WORTHWHILE * best.timing.duration):
                 best = other
     if best is None:
-        rough = _best(found, REACHED, fastest)
+        rough = best_candidate(found, REACHED, fastest)
         best = _by_another(found, rough, fastest) or rough
-    return None if best is None else _made(found, best)
+    return None if best is None else write_scenario(found, best)
 
 
-def _best(found: Survey, errors: Errors, fastest: bool) -> _Candidate | None:
+def best_candidate(found: Survey, errors: Errors, fastest: bool) -> Candidate | None:
+    """The fastest timing that the solver of a survey follows within errors in [m] and [rad]; None if there is none."""
     if not fastest and (motion := found.as_asked(errors)) is not None:
-        return _Candidate(found.best, Timing.uniform(found.duration, 1.0), motion, found.solver)
-    best: _Candidate | None = None
+        return Candidate(found.best, Timing.uniform(found.duration, 1.0), motion, found.solver)
+    best: Candidate | None = None
     for branch in found.branches[:TRIED]:
         best = _faster(found, branch, best, errors, fastest)
     for _ in range(AGAIN if best else 0):
@@ -128,7 +129,7 @@ def _best(found: Survey, errors: Errors, fastest: bool) -> _Candidate | None:
     return best
 
 
-def _by_another(found: Survey, rough: _Candidate | None, fastest: bool) -> _Candidate | None:
+def _by_another(found: Survey, rough: Candidate | None, fastest: bool) -> Candidate | None:
     """A timing that another solver follows closely: that of `qp`, or those of the best branches; None if none."""
     timings = [(one, one.shortest if fastest else one.asked) for one in found.branches[:OTHER_BRANCHES]]
     if rough is not None:
@@ -159,7 +160,7 @@ def refusal(found: Survey) -> str:
     )
 
 
-def _faster(found: Survey, branch: Branch, best: _Candidate | None, errors: Errors, fastest: bool) -> _Candidate | None:
+def _faster(found: Survey, branch: Branch, best: Candidate | None, errors: Errors, fastest: bool) -> Candidate | None:
     """The fastest timing along a branch that is faster than the best so far; else that one."""
     timing = branch.shortest if fastest else branch.asked
     if timing is None:
@@ -179,15 +180,16 @@ def _faster(found: Survey, branch: Branch, best: _Candidate | None, errors: Erro
 
 def _followed(
     found: Survey, branch: Branch, timing: Timing, errors: Errors, solver: str | None = None
-) -> _Candidate | None:
+) -> Candidate | None:
     """The timing with its motion, if the solver follows."""
     solver = found.solver if solver is None else solver
     trajectory = timing.of(found.scenario.trajectory)
     motion = followed(found.play(solver, branch.start, trajectory=trajectory), errors)
-    return None if motion is None else _Candidate(branch, timing, motion, solver)
+    return None if motion is None else Candidate(branch, timing, motion, solver)
 
 
-def _made(found: Survey, best: _Candidate) -> Retimed:
+def write_scenario(found: Survey, best: Candidate) -> Retimed:
+    """The scenario that a candidate drives."""
     changes: dict[str, Any] = {"initial_pose": None, "iterations_per_point": 1}
     if best.timing.duration != found.duration:
         changes |= {"trajectory": best.timing.of(found.scenario.trajectory), "steps": None}

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tqdm import tqdm
 
 from baselines.paths.starts import solutions
+from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import clearance_rows
 from ikgym.obstacles.solids import solids_of
@@ -27,6 +28,8 @@ FIRST_ORDER, CORRECTIONS = 1.3, 2
 USED, TOLERANCE = 0.999, 1e-9
 #: Between two knots bodies are checked at these parts of the way, which are even.
 PARTS = (0.25, 0.5, 0.75, 1.0)
+#: Components of the errors of tasks for which there is a search.
+SEARCHED = (3, 5, 6)
 #: Postures are left out whose Jacobian, in units of the largest motions, has less than this on a diagonal.
 SINGULAR = 1e-6
 
@@ -60,10 +63,11 @@ class Routes:
     that lie on the path exactly. A path that is not found may exist between the cells.
 
     Args:
-        scenario: A scenario whose path is the same at every reset, and whose task is a position, or a whole pose.
+        scenario: A scenario whose path is the same at every reset, and whose task is a position, an axis, or a pose.
         times: Of the knots in [s]. Shape (k,).
         largest: Largest motion of each joint between two knots, in [rad] or [m]. Shape (n,).
         margin: Distance that bodies keep at knots and on the way between them, in [m].
+        edge: Distance that joints keep from their stops, in [rad] or [m].
         cell: Size of the cells, as a share of the largest motion.
         postures: Most postures that are kept at a knot.
 
@@ -75,14 +79,14 @@ class Routes:
     times: FloatArray
     largest: FloatArray
     margin: float = 0.002
+    edge: float = 0.0
     cell: float = 0.6
     postures: int = 800
 
     def __post_init__(self) -> None:
-        if self.scenario.random or self.scenario.task.error_size not in (3, 6):
+        if self.scenario.random or self.scenario.task.error_size not in SEARCHED:
             raise InvalidInputError(
-                f"Scenario {self.scenario.name!r}: expected one path, and a task of position or of position and "
-                "orientation."
+                f"Scenario {self.scenario.name!r}: expected one path, and a task of a position, an axis or a pose."
             )
         object.__setattr__(self, "times", float_array("times", self.times, (None,)))
         object.__setattr__(self, "largest", per_joint("largest", self.largest, self.scenario.joints))
@@ -96,9 +100,9 @@ class Routes:
             start: Joint coordinates at the first knot in [rad] or [m], where they are given; else any will do.
         """
         rng = np.random.default_rng(0)
-        q = solutions(self.scenario) if start is None else start[None]
+        q, arm = (solutions(self.scenario), self.arm) if start is None else (start[None], self.scenario.arm)
         layers = [Layer(q, np.zeros(len(q)), np.zeros(len(q), dtype=np.int64))]
-        layers[0] = layers[0].of(self._clear(0, q))
+        layers[0] = layers[0].of(self._clear(0, q) & ((arm.lower <= q) & (q <= arm.upper)).all(axis=1))
         # A search of seconds needs no bar, one of minutes does; there is none where nobody watches.
         with tqdm(total=len(self.times), desc="Planning", unit="knot", delay=3.0, disable=None, leave=False) as bar:
             while len(layers) < len(self.times) and len(layers[-1].q):
@@ -112,15 +116,27 @@ class Routes:
             row = int(layer.before[row])
         return np.array(out[::-1]).reshape(-1, self.scenario.joints)
 
+    @functools.cached_property
+    def arm(self) -> Arm:
+        """The arm with limits that leave the edge free."""
+        arm = self.scenario.arm
+        return arm if self.edge == 0.0 else arm.replace(lower=arm.lower + self.edge, upper=arm.upper - self.edge)
+
+    def meet(self, frames: FloatArray, near: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Postures at poses of the path, near others (N, n), and whether they meet them. Shapes (N, n), (N,)."""
+        start = np.clip(near, self.arm.lower, self.arm.upper)
+        rotations = rotations_near(self.scenario, frames, self.arm.forward(start)[0])
+        return self.arm.inverse(rotations, frames[..., -3:], start=start, tolerance=TOLERANCE, restarts=0)
+
     def _next(self, knot: int, last: Layer, rng: np.random.Generator) -> Layer:
         """The postures at a knot that can be reached from those before."""
         moves, rows = self._moves(knot, last.q, rng)
-        q, met = self._exact(knot, last.q[rows] + self.largest * moves)
-        for _ in range(CORRECTIONS):
+        q, met = self.meet(self.frames[knot], last.q[rows] + self.largest * moves)
+        for _ in range(CORRECTIONS * (self.scenario.joints > self.scenario.task.error_size)):
             moves = (q - last.q[rows]) / self.largest
             size = np.abs(moves).max(axis=1)
             far = np.flatnonzero(met & (size > USED) & (size <= FIRST_ORDER))
-            q[far], met[far] = self._exact(knot, q[far] + self.largest * self._back(q[far], moves[far]))
+            q[far], met[far] = self.meet(self.frames[knot], q[far] + self.largest * self._back(q[far], moves[far]))
         moves = (q - last.q[rows]) / self.largest
         near = met & (np.abs(moves).max(axis=1) <= USED)
         found = Layer(q, last.cost[rows] + (moves * moves).sum(axis=1), rows).of(near)
@@ -128,15 +144,10 @@ class Routes:
             found = found.of(self._clear(knot - 1.0 + part, self._between(last, found, part)))
         return found.of(self._cheapest(found.q, found.cost, rng))
 
-    def _exact(self, knot: int, start: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Postures at the pose of a knot, near others, and whether there are any."""
-        arm = self.scenario.arm
-        start = np.clip(start, arm.lower, arm.upper)
-        return arm.inverse(*self._pose(knot), start=start, tolerance=TOLERANCE, restarts=0)
-
     def _back(self, q: FloatArray, moves: FloatArray) -> FloatArray:
         """Joint motions in the null space at q after which moves that are too large are within 1, to first order."""
-        jacobian = self.scenario.arm.jacobian(q)[:, : self.scenario.task.error_size] * self.largest
+        turned, _, jacobian = self.scenario.arm.forward_and_jacobian(q)
+        jacobian = self._rows(jacobian, turned) * self.largest
         direction = np.linalg.svd(jacobian).Vh[:, -1]
         middle, half = _room(moves, direction)
         half = ASIDE[-1] * np.maximum(half, 0.0)
@@ -145,13 +156,13 @@ class Routes:
 
     def _moves(self, knot: int, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint motions to a knot in units of the largest ones, and the rows of q where they begin; to first order."""
-        arm = self.scenario.arm
-        rotation, position = self._pose(knot)
-        turned, there, jacobian = arm.forward_and_jacobian(q)
-        error = position - there
-        if rotation is not None:
-            error = np.hstack([error, 0.5 * np.cross(turned, rotation[None], axis=1).sum(axis=2)])
-        jacobian = jacobian[:, : error.shape[1]] * self.largest
+        turned, there, jacobian = self.scenario.arm.forward_and_jacobian(q)
+        wanted = rotations_near(self.scenario, self.frames[knot], turned)
+        error = np.hstack([self.frames[knot, -3:] - there, np.zeros_like(there)])
+        if wanted is not None:
+            error[:, 3:] = 0.5 * np.cross(turned, wanted, axis=1).sum(axis=2)
+        error = self._rows(error[..., None], turned)[..., 0]
+        jacobian = self._rows(jacobian, turned) * self.largest
         basis, triangle = np.linalg.qr(jacobian.transpose(0, 2, 1), mode="complete")
         rank = error.shape[1]
         triangle = triangle[:, :rank].transpose(0, 2, 1)
@@ -160,8 +171,9 @@ class Routes:
         least = np.linalg.solve(triangle[rows], error[rows, :, None])
         least = (basis[rows, :, :rank] @ least)[..., 0]
         free = basis[rows, :, rank:]
-        moves, begins = [], []
-        for _ in range(1 if free.shape[2] == 1 else DIRECTIONS):
+        # An arm without a null space has one motion to each pose.
+        moves, begins = ([], []) if free.shape[2] else ([least], [rows])
+        for _ in range((0, 1, DIRECTIONS)[min(free.shape[2], 2)]):
             direction = (free @ rng.normal(size=(len(rows), free.shape[2], 1)))[..., 0]
             middle, half = _room(least, direction)
             for share in ASIDE:
@@ -171,12 +183,16 @@ class Routes:
         small = np.abs(every).max(axis=1) <= FIRST_ORDER
         return every[small], np.concatenate(begins)[small]
 
-    def _pose(self, knot: int) -> tuple[FloatArray | None, FloatArray]:
-        frame = self._frames[knot]
-        return (frame[:9].reshape(3, 3) if self.scenario.task.has_orientation else None), frame[-3:]
+    def _rows(self, values: FloatArray, turned: FloatArray) -> FloatArray:
+        """The rows of (N, 6, k) that belong to the task; about the tool's x and y axes where its z axis is free."""
+        size = self.scenario.task.error_size
+        if size != 5:
+            return values[:, :size]
+        return np.concatenate([values[:, :3], turned[:, :, :2].swapaxes(1, 2) @ values[:, 3:]], axis=1)
 
     @functools.cached_property
-    def _frames(self) -> FloatArray:
+    def frames(self) -> FloatArray:
+        """The poses at the knots, as :meth:`Trajectory.frames` has them. Shape (k, 12) or (k, 3)."""
         return self.scenario.trajectory.frames(self.times, self.scenario.model)
 
     def _between(self, last: Layer, found: Layer, part: float) -> FloatArray:
@@ -214,9 +230,24 @@ class Routes:
         return solids_of(self.scenario.obstacles, times, self.scenario.model)
 
 
+def rotations_near(scenario: Scenario, frames: FloatArray, turned: FloatArray) -> FloatArray | None:
+    """Rotations of the tool that a task allows at frames (..., 12), near others (N, 3, 3); None where all will do."""
+    if not scenario.task.has_orientation:
+        return None
+    rotations = np.broadcast_to(frames[..., :9].reshape(*frames.shape[:-1], 3, 3), turned.shape)
+    if scenario.task.error_size != 5:
+        return rotations
+    z = rotations[:, :, 2]
+    x = turned[:, :, 0] - (turned[:, :, 0] * z).sum(axis=1, keepdims=True) * z
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
 def _room(moves: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How far moves can go along directions with all joints within 1: middle and half of the range. Shape (N,) each."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.sort([(-1.0 - moves) / direction, (1.0 - moves) / direction], axis=0)
     low, high = ends[0].max(axis=1), ends[1].min(axis=1)
+    # A joint that moves too far, and not along the direction, leaves no range.
+    low, high = (np.where(np.isfinite(low + high), end, 0.0) for end in (low, high))
     return 0.5 * (low + high), 0.5 * (high - low)

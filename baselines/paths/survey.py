@@ -190,7 +190,9 @@ def follows(motion: Motion, errors: tuple[float, float] = FOLLOWED) -> bool:
     return bool(position <= errors[0] and orientation <= errors[1] and free)
 
 
-def survey(scenario: Scenario, *, reserve: float = 0.0, solver: str = PREFERRED) -> Survey:
+def survey(
+    scenario: Scenario, *, reserve: float = 0.0, solver: str = PREFERRED, begin: FloatArray | None = None
+) -> Survey:
     """Follows a path from several start branches, and times each of them.
 
     Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
@@ -201,6 +203,7 @@ def survey(scenario: Scenario, *, reserve: float = 0.0, solver: str = PREFERRED)
         scenario: A scenario whose path is the same at every reset. Its plant is taken to be ideal.
         reserve: The share of the limits of velocity and acceleration that motions leave to feedback, from 0 to 0.9.
         solver: The solver, as text such as ``"qp:secondary_gain=0"``.
+        begin: Starts in [rad] or [m] instead of those that are searched. Shape (N, n).
 
     Raises:
         InvalidInputError: The path is random, its first pose is out of reach, none of its postures is clear, or the
@@ -213,7 +216,7 @@ def survey(scenario: Scenario, *, reserve: float = 0.0, solver: str = PREFERRED)
             f"dt: expected a control period of at most a tenth of the path's {duration:.4g} s, got {scenario.dt:g} s."
         )
     whole, scenario = scenario, with_reserve(scenario, reserve)
-    begin = starts(ideal(scenario))
+    begin = starts(ideal(scenario)) if begin is None else begin
     branches = _branches(scenario, begin, 1.0, solver)
     if sum(branch.whole for branch in branches) < 0.5 * len(branches):
         # Poses that even the slowest play misses are out of reach.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ikgym.trajectories import paths
 from ikgym.trajectories.batch import JointMotions, first_joints_of, frames_of, joint_paths_of
 from ikgym.trajectories.helix import Helix
+from ikgym.trajectories.joint_path import JointPath
 from ikgym.trajectories.joint_spline import JointSpline, RandomJointSpline
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory
@@ -27,6 +28,7 @@ __all__ = [
     "FixedOrientation",
     "Helix",
     "JointMotions",
+    "JointPath",
     "JointSpline",
     "OrientationThrough",
     "PathTrajectory",
@@ -64,4 +66,5 @@ KINDS: dict[str, type[Trajectory]] = {
     "published_path": PublishedPath,
     "random_published_path": RandomPublishedPath,
     "retimed": RetimedTrajectory,
+    "joint_path": JointPath,
 }

@@ -16,6 +16,7 @@ from baselines.controller.guards import Guards
 from baselines.files import check_writable_file
 from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.motion import OTHERS, PREFERRED
+from baselines.paths.planning import PLAYER, Plan, plan
 from baselines.paths.retiming import refusal, retimed
 from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
@@ -55,7 +56,8 @@ def manual(prog: str) -> str:
     return f"""\
 Says whether an arm can drive a path, from which start and how fast: qp plays it from several postures at the first
 pose, and toppra finds the shortest time in which the limits hold, less a reserve for feedback. Where the arm has
-bodies, it keeps clear of itself and of obstacles. Needs pip install "ikgym[paths]".
+bodies, it keeps clear of itself and of obstacles. Where qp follows from no posture, a joint motion is planned along the
+whole path. Needs pip install "ikgym[paths]".
 
 Examples:
   {prog} weld.toml --retime weld-retimed.toml
@@ -73,7 +75,10 @@ def _work(options: Options, _: str) -> None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])
     driven = retimed(found, fastest=options.fastest)
-    head, verdict = ([_fold(line) for line in lines] for lines in (_head(found), _verdict(found, driven)))
+    close = driven is not None and follows(driven.motion)
+    planned = None if close else plan(found, fastest=options.fastest)
+    driven = (planned and planned.motion) or driven
+    head, verdict = ([_fold(line) for line in lines] for lines in (_head(found), _verdict(found, driven, planned)))
     print("\n".join([*head, "", _table(every), "", *verdict]))
     if options.retime is not None:
         if driven is None:
@@ -187,15 +192,17 @@ def _unit(arm: Arm, joint: int) -> str:
     return "m" if arm.prismatic[joint] else "rad"
 
 
-def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
+def _verdict(found: Survey, driven: Retimed | None, planned: Plan | None) -> list[str]:
     if driven is None:
-        return [f"It cannot be driven: {refusal(found)}", *_free_about_z(found)]
+        return [f"It cannot be driven: {refusal(found)}{_ended(found, planned)}", *_free_about_z(found)]
     motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
     how = f"{driven.solver} follows within {_small(motion.position_error.max(), 'm')}"
     if found.scenario.task.has_orientation:
         how += f" and {_small(motion.orientation_error.max(), 'rad')}"
     if not follows(motion):
         how += f" (no closer, nor do {' and '.join(OTHERS)}: a stop or a singularity is near)"
+    elif driven.solver == PLAYER:
+        how += " (a joint motion planned along the whole path: no solver follows it from any start branch)"
     elif driven.solver in OTHERS:
         how += f" (where {PREFERRED} does not: a stop or a singularity is near)"
     elif driven.solver != PREFERRED:
@@ -204,8 +211,11 @@ def _verdict(found: Survey, driven: Retimed | None) -> list[str]:
     used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve else ""
     lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]
     if driven.solver != PREFERRED:
-        lines.append(f"Play it with {driven.solver}: evaluate --policies, Controller(…, {driven.solver!r}).")
-    return [*lines, *_warnings(found, driven)]
+        where = f"Controller(…, {driven.solver!r})"
+        if driven.solver == PLAYER:
+            where = "Scenario.nominal_joint_path() gives its joint coordinates"
+        lines.append(f"Play it with {driven.solver}: evaluate --policies, {where}.")
+    return lines if driven.solver == PLAYER else [*lines, *_warnings(found, driven)]
 
 
 def _warnings(found: Survey, driven: Retimed) -> list[str]:
@@ -223,13 +233,22 @@ def _warnings(found: Survey, driven: Retimed) -> list[str]:
     return lines
 
 
+def _ended(found: Survey, planned: Plan | None) -> str:
+    """Where the search along the whole path has ended."""
+    if planned is None:
+        return ""
+    if planned.reached < found.duration:
+        return f" A search for joint motions along the whole path gets as far as {planned.reached:.3g} s."
+    return " A joint motion along the whole path exists, but none that keeps the limits was found."
+
+
 def _when(found: Survey, driven: Retimed) -> str:
     """Whether the path can be driven in the time that was asked for, and in which one it can."""
     can = "It can be driven as it is"
     if driven.duration == found.duration:
         return can
     speed = f"in {driven.duration:.3g} s, at up to {fastest(driven.scenario)[0]:.3g} m/s"
-    if any(found.as_asked(REACHED, solver) for solver in {PREFERRED, driven.solver}):
+    if any(found.as_asked(REACHED, solver) for solver in {PREFERRED, driven.solver} - {PLAYER}):
         return f"{can}, and {speed}"
     if driven.duration < found.duration:
         return f"It cannot be driven at the speeds that were asked for, but at others, {speed}"

@@ -136,7 +136,8 @@ def test_obstacles_of_a_file(capsys):
     text = " ".join(capsys.readouterr().out.split())
     assert re.search(r" clearance .* mm: link\w+, block", text)
     assert re.search(
-        r"It cannot be driven: no start reaches all of it and keeps clear\..* 'link\w+' and 'block' are .* mm apart at",
+        r"It cannot be driven: no start reaches all of it and keeps clear\..* 'link\w+' and 'block' are .* mm apart at"
+        r" .* A search for joint motions along the whole path gets as far as [\d.]+ s\.",
         text,
     )
     assert main([*words, "--bodies", "off"]) == 0
@@ -175,8 +176,23 @@ def test_another_solver_is_tried_before_a_singularity_is_blamed(worse_qp, monkey
     assert EpisodeOptions(policy=("dls",)).policies(scenario) == ("dls",)
     monkeypatch.setattr(retiming, "OTHERS", ())
     assert main(words) == 0
+    assert "follow_nominal follows within" in " ".join(capsys.readouterr().out.split())
+    monkeypatch.setattr(path, "plan", lambda found, fastest: None)
+    assert main(words) == 0
     assert "(no closer, nor do sns and rhc_foresight: a stop or" in " ".join(capsys.readouterr().out.split())
     assert ikgym.scenarios.load("out.toml").policy is None
+
+
+def test_a_motion_along_the_whole_path_where_no_start_branch_leads_to_its_end(capsys):
+    """A tool between two boxes: `qp` is stopped by a joint limit or a box from every start."""
+    assert main(["path", "cppflow-panda-flappy_bird", "--retime", "way.toml"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "It can be driven as it is: follow_nominal follows within" in text
+    assert "(a joint motion planned along the whole path: no solver follows it from any start branch)" in text
+    scenario = ikgym.scenarios.load("way.toml")
+    tracking = baselines.track(scenario, scenario.policy)
+    assert tracking.position_error.max() < 5e-5
+    assert scenario.arm.clearance(tracking.q, scenario.obstacles)[0].min() > 0.0
 
 
 def test_a_free_rotation_is_suggested_where_it_helps(capsys):

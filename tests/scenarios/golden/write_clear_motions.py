@@ -9,7 +9,6 @@ import sys
 
 import numpy as np
 
-from baselines.paths.planned import between
 from baselines.paths.routes import Routes
 from ikgym import scenarios
 from ikgym.trajectories.batch import paths_of
@@ -32,6 +31,16 @@ def search(scenario):
             clear = clearances(scenario, q)[0].min() if converged and max(shares(scenario, q)) < 1.0 else -np.inf
             best = max(best, (clear, control), key=lambda one: one[0])
     return best
+
+
+def between(scenario, knots, q):
+    """A joint path at every step from that at knots, which goes through the poses exactly."""
+    steps = np.arange(scenario.steps + 1)
+    even = np.column_stack([np.interp(steps, knots, joint) for joint in q.T])
+    frames = scenario.frames(scenario.trajectory, len(steps))
+    rotations = frames[:, :9].reshape(-1, 3, 3) if scenario.task.has_orientation else None
+    exact, met = scenario.arm.inverse(rotations, frames[:, -3:], start=even, restarts=0)
+    return np.where(met[:, None], exact, even)
 
 
 def fitted(scenario, q):
