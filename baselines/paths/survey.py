@@ -25,10 +25,7 @@ USED = 0.985, 0.96
 #: The path is played in the time asked for, and where most branches miss poses, in so many times the time: as slowly as
 #: can be, then slower and slower until half of the branches reach all of it.
 SLOWEST, SLOWER = 30.0, (1.6, 2.5, 4.0, 6.5, 10.0, 16.0)
-#: In a slower play the first so many seconds do not count as accelerations: redundant joints leave their start, at
-#: whatever speed the path is played.
-SETTLED = 0.3
-#: Steps of such a play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
+#: Steps of a slower play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
 FEWEST_STEPS, MOST_STEPS = 1000, 4000
 #: Timings that take at most so many times the requested time count as the same. Joints nearer to a stop than the first
 #: of these distances, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
@@ -250,7 +247,6 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
     """A branch from the motion of one start, played in the timing."""
     q, dt, arm = motion.q[:, 0], motion.times[1], scenario.arm
     slowing = timing.duration / float(timing.progress[-1])
-    moving = q[int(SETTLED / dt) if slowing > 1.0 else 0 :]
     missed = (motion.position_error > REACHED[0]) | (motion.orientation_error > REACHED[1])
     reached = float(np.argmax(missed) / len(missed)) if missed.any() else 1.0
     timings: list[Timing | None] = [None, None]
@@ -267,7 +263,7 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
         position_error=float(motion.position_error.max()),
         orientation_error=float(motion.orientation_error.max()),
         velocity=np.abs(np.diff(q, axis=0)).max(axis=0) / dt * slowing,
-        acceleration=np.abs(np.diff(moving, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
+        acceleration=np.abs(np.diff(q, n=2, axis=0)).max(axis=0) / dt**2 * slowing**2,
         leap=float((np.abs(q[1] - q[0]) / dt / scenario.largest_qdot).max()),
         room=np.minimum(q - arm.lower, arm.upper - q).min(axis=0),
         contact=_contact(scenario, motion, slowing),
