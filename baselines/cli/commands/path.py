@@ -194,7 +194,7 @@ def _unit(arm: Arm, joint: int) -> str:
 
 def _verdict(found: Survey, driven: Retimed | None, planned: Plan | None) -> list[str]:
     if driven is None:
-        return [f"It cannot be driven: {refusal(found)}{_ended(found, planned)}", *_free_about_z(found)]
+        return [f"It cannot be driven: {refusal(found)}{_describe_end(found, planned)}", *_free_about_z(found)]
     motion, start = driven.motion, shell.numbers(np.round(driven.motion.q[0, 0], 4))
     how = f"{driven.solver} follows within {_small(motion.position_error.max(), 'm')}"
     if found.scenario.task.has_orientation:
@@ -233,7 +233,7 @@ def _warnings(found: Survey, driven: Retimed) -> list[str]:
     return lines
 
 
-def _ended(found: Survey, planned: Plan | None) -> str:
+def _describe_end(found: Survey, planned: Plan | None) -> str:
     """Where the search along the whole path has ended."""
     if planned is None:
         return ""
