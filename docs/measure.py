@@ -1,6 +1,7 @@
 """Measures tables of `docs/results`: ``python -m docs.measure pose cost_time periods``.
 
-A table says by its lines what is played: scenario, policy, episodes and seeds. To add a policy, add a line with these
+A table with a module of its name in this folder is what its `measured` returns; a new one begins as an empty CSV file.
+Others say by their lines what is played: scenario, policy, episodes and seeds. To add a policy, add a line with these
 columns; --new measures those alone. Each policy is timed in two episodes, on one core: times compare within one run on
 a machine that does nothing else. A killed measurement continues where it was. Agents that were trained are read from
 ``runs/NAME/seed-*``, the untrained ones are written there; a line whose scenario or agent is not here stays as it is.
@@ -11,6 +12,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
+import inspect
 import itertools
 import shutil
 import sys
@@ -30,8 +33,7 @@ from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import LOWEST
 from baselines.evaluation.table import records
 from baselines.spec import parse_policy
-from docs import compare, contexts, drift, loop, obstructed, retimed, rivals, tuned
-from docs.keeping import RUNS, WORK, Line, keep, lines, resumable
+from docs.keeping import PAGES, RESULTS, RUNS, WORK, Line, keep, lines, resumable
 
 #: Agents as they are before their training, and their training seeds.
 UNTRAINED, SEEDS = "untrained", range(5)
@@ -53,8 +55,7 @@ class Command:
     """Measures tables of docs/results anew."""
 
     tables: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names of CSV files without their end: pose, cost_time, periods, foresight, free_timing, skew, agents_panda,
-    bodies, plants, contexts, compare, drift, loop, retimed, obstructed, rivals and tuned."""
+    """Names of CSV files without their end, such as pose, cost_time or compare."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
 
@@ -167,26 +168,31 @@ def _adaptive(line: Line) -> Line:
     return {**line, **{column: found[column] for column in ("cost_ratio", "low", "high", "worst")}}
 
 
-#: Tables with columns of their own, and those among them that are measured as a whole.
-OWN: dict[str, Callable[..., list[Line]]] = {"contexts": contexts.measured, "plants": plants}
-WHOLE: dict[str, Callable[[], list[Line]]] = {
-    "compare": compare.measured,
-    "drift": drift.measured,
-    "loop": loop.measured,
-    "obstructed": obstructed.measured,
-    "retimed": retimed.measured,
-    "rivals": rivals.measured,
-    "tuned": tuned.measured,
-}
+def table_of(name: str, *, only_new: bool = False) -> list[Line]:
+    """A table: that of the module `docs.NAME` where there is one, else by the lines of its CSV file.
+
+    Raises:
+        SystemExit: There is no such table, or it is measured as a whole, and new lines alone were asked for.
+    """
+    if not (RESULTS / f"{name}.csv").is_file():
+        available = ", ".join(sorted(file.stem for file in RESULTS.glob("*.csv")))
+        raise SystemExit(f"tables: expected names of tables, got {name!r}; available: {available}.")
+    if name == "plants":
+        return plants(only_new=only_new)
+    if not (PAGES / f"{name}.py").is_file():
+        return measured(name, only_new=only_new)
+    measure = importlib.import_module(f"docs.{name}").measured
+    if "only_new" in inspect.signature(measure).parameters:
+        return list(measure(only_new=only_new))
+    if only_new:
+        raise SystemExit(f"{name}: this table is measured as a whole; leave --new out.")
+    return list(measure())
 
 
 def main(command: Command) -> None:
     """Writes the tables."""
     for name in command.tables:
-        if name in WHOLE and command.new:
-            raise SystemExit(f"{name}: this table is measured as a whole; leave --new out.")
-        make = OWN.get(name, functools.partial(measured, name))
-        keep(name, WHOLE[name]() if name in WHOLE else make(only_new=command.new))
+        keep(name, table_of(name, only_new=command.new))
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
             shutil.rmtree(folder)
 

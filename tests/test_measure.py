@@ -83,3 +83,11 @@ def test_plants_are_measured_by_the_lines_of_their_table(table, monkeypatch):
     new, old = measure.plants(only_new=True)
     assert 1.0 < new["low"] < new["cost_ratio"] < new["high"] <= new["worst"]
     assert old["cost_ratio"] == "1.5"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("nothing", "expected names of tables, got 'nothing'"), ("drift", "measured as a whole")]
+)
+def test_a_table_that_cannot_be_measured(name, message):
+    with pytest.raises(SystemExit, match=message):
+        measure.table_of(name, only_new=True)
