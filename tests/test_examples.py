@@ -10,7 +10,14 @@ import pytest
 
 ROOT = Path(__file__).parents[1] / "examples"
 #: Arguments that make each example short.
-SMALL = {"ppo": (1,), "wrappers": (), "behaviour_cloning": (2, 3, 1), "sac": (64, 3), "torchrl_ppo": (1,)}
+SMALL = {
+    "ppo": (1,),
+    "real_arm": (0.5, 0.02, False),
+    "wrappers": (),
+    "behaviour_cloning": (2, 3, 1),
+    "sac": (64, 3),
+    "torchrl_ppo": (1,),
+}
 # TorchRL is in no extra, and warns of what is old in itself.
 TORCHRL = [
     pytest.mark.skipif(importlib.util.find_spec("torchrl") is None, reason="no TorchRL: pip install torchrl"),
@@ -27,6 +34,7 @@ def run(example, *arguments):
     return runpy.run_path(str(ROOT / f"{example}.py"))["main"](*arguments)
 
 
+@pytest.mark.filterwarnings("ignore:.*does not keep the control period")  # the machine does other things besides
 @pytest.mark.parametrize("example", [marked(path.stem) for path in sorted(ROOT.glob("*.py"))])
 def test_example(example, capsys, tmp_path):
     run(example, *((tmp_path / "sac",) if example == "sac" else ()), *SMALL[example])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from baselines.controller.controller import Controller
 from baselines.controller.drives import Drives
 from baselines.controller.guards import Guards, StopReason
+from baselines.controller.mock_arm import ArmInterface, MockArm, Reflex, State
 from baselines.controller.timing import Timing
 
-__all__ = ("Controller", "Drives", "Guards", "StopReason", "Timing")
+__all__ = ("ArmInterface", "Controller", "Drives", "Guards", "MockArm", "Reflex", "State", "StopReason", "Timing")

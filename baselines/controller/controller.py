@@ -119,6 +119,7 @@ class Controller:
         q_age: float = 0.0,
         pose_age: float = 0.0,
         obstacles: npt.ArrayLike | Sequence[Obstacle] | None = None,
+        commanded: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """The joint velocities for the next control period.
 
@@ -136,6 +137,9 @@ class Controller:
             obstacles: The obstacles as they will be at the end of this period, in the order of the scenario's, where
                 those move or are drawn: :mod:`ikgym.obstacles`, or rows as in the observation of the environment, of
                 shape (o, 16).
+            commanded: The joint velocities in [rad/s] or [m/s] that the arm has taken for the last command, where its
+                interface reports them (libfranka: ``dq_d``): others than were sent where a message was lost. The limits
+                of acceleration and jerk start from them. The last command if left out. Shape (n,).
 
         Returns:
             Joint velocities in [rad/s] or [m/s], within the limits. Shape (n,).
@@ -145,6 +149,13 @@ class Controller:
         """
         measured = numbers("q", q, (self._joints,))
         speed = self._last.copy() if qdot is None else self._speed(qdot)
+        if commanded is not None:
+            sent = numbers("commanded", commanded, (self._joints,))
+            if np.isfinite(sent).all():
+                self._moved += sent - self._last
+                self._last[:] = sent
+            else:
+                speed = sent  # which the guards refuse
         seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)

@@ -24,7 +24,7 @@ from baselines.solvers.quadratic_program.program import (
     motion_weight,
     weigh_rotation,
 )
-from baselines.solvers.quadratic_program.velocity_box import smooth_box
+from baselines.solvers.quadratic_program.velocity_box import calm_gain, smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED
 from baselines.status import Status
 from ikgym.kernels import tasks
@@ -66,12 +66,12 @@ def path_step(model, numbers, batch, solution):
             preferred[j] = pull[0, j] * (pull[1, j] - q[row, j])
         weigh_rotation(model.kind, numbers.rotation_weight, jac, motion, missing)
         jac *= dt
-        missing *= numbers.gain
+        missing *= calm_gain(limits, numbers.gain)
         weight = motion_weight(jac, missing, numbers.damping, numbers.lm_damping, weights, limits[FASTEST])
         weight *= SCALING_WEIGHT
         curvature(jac, weight, weights, hessian)
         if numbers.braking > 0.0 and factorise(hessian, factor):
-            missing *= feedback_share(factor, jac, missing, numbers.braking, limits[CHANGE])
+            missing *= feedback_share(factor, jac, missing, calm_gain(limits, 1.0) * numbers.braking, limits[CHANGE])
         least = min(max(steps + 1.0 - numbers.latest - progress, 0.0), 1.0)
         goals = weight, weights, preferred, speed, least
         made, solution.iterations[row], found = _minimum(

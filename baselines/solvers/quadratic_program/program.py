@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from baselines.solvers.quadratic_program.velocity_box import braking_speed, smooth_box
+from baselines.solvers.quadratic_program.velocity_box import braking_speed, calm_gain, smooth_box
 from ikgym.kernels.jit import inner, uncounted
 from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.linear_algebra import cholesky, cholesky_solve, transposed_product
@@ -221,8 +221,9 @@ def row_program(model, numbers, q, last, change, jacobian, motion, error, prefer
     smooth_box(model.limits, model.dt, q, last, change, lower, upper)
     if numbers.rotation_weight != 1.0:
         weigh_rotation(model.kind, numbers.rotation_weight, jacobian, motion, error)
+    gain = calm_gain(model.limits, numbers.gain)
     for a in range(error.shape[0]):
-        error[a] *= numbers.gain
+        error[a] *= gain
         for j in range(q.shape[0]):
             jacobian[a, j] *= model.dt
     weights, n, share = numbers.weights, q.shape[0], 1.0
@@ -232,7 +233,9 @@ def row_program(model, numbers, q, last, change, jacobian, motion, error, prefer
     factor = np.empty((n, n))
     definite = factorise(hessian, factor)
     if definite and numbers.braking > 0.0:
-        share = feedback_share(factor, jacobian, error, numbers.braking, model.limits[CHANGE])
+        share = feedback_share(
+            factor, jacobian, error, calm_gain(model.limits, 1.0) * numbers.braking, model.limits[CHANGE]
+        )
     if definite and numbers.secondary_share < math.inf:
         limit_secondary(factor, jacobian, motion, error, numbers.secondary_share, weight, weights, preferred)
     for a in range(error.shape[0]):

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.policy.fields import derived
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
-from baselines.solvers.quadratic_program.velocity_box import smooth_box
+from baselines.solvers.quadratic_program.velocity_box import calm_gain, smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
 from baselines.status import Status
 from ikgym.kernels.jit import inner, kernel
@@ -92,7 +92,7 @@ def scaling(along, base, lower, upper):
 def sns_step(model, numbers, batch, solution):
     """One step of :class:`SaturationInNullSpace`; see :class:`CompiledPolicy` for the arguments."""
     jacobian, shift, error = task_motion(model, batch, solution.memory)
-    error *= numbers.gain
+    error *= calm_gain(model.limits, numbers.gain)
     (q, last), (qdot, _, status, iterations), limits, dt = (batch.q, batch.qdot), solution, model.limits, model.dt
     reach, n = numbers.reach, q.shape[1]
     lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
@@ -106,7 +106,8 @@ def sns_step(model, numbers, batch, solution):
             weight = motion_weight(jac, error[row], numbers.damping, 0.0, equal, limits[FASTEST])
             curvature(jac, weight, equal, hessian)
             if cholesky(hessian):
-                error[row] *= feedback_share(hessian, jac, error[row], numbers.braking, limits[CHANGE] / reach)
+                part = calm_gain(limits, 1.0) * numbers.braking
+                error[row] *= feedback_share(hessian, jac, error[row], part, limits[CHANGE] / reach)
         shift[row] += error[row]
         iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
         qdot[row] *= reach

@@ -141,6 +141,18 @@ def _fastest_forward(room, velocity, change, most, step, limit):
     return low
 
 
+@inlined
+def calm_gain(limits, gain):
+    """The share of an error that is corrected in a step, smaller where an acceleration takes some steps to build up.
+
+    A larger one would let an arm with limits of jerk swing about its reference. ``limits`` have the shape (6, n).
+    """
+    for j in range(limits.shape[1]):
+        if limits[JERK, j] < math.inf:
+            gain = min(gain, 1.0 / (1.0 + limits[BRAKING, j] / limits[JERK, j]))
+    return gain
+
+
 @uncounted
 def smooth_box(limits, dt, q, last, change, lower, upper):
     """Least and largest joint velocities of the next step, with a bounded jerk where there is a limit of it.

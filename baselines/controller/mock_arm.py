@@ -1,0 +1,240 @@
+"""A mock arm that refuses what a real one refuses: limits of commands, lost messages, joints that run into stops."""
+
+from __future__ import annotations
+
+import enum
+import multiprocessing
+import time
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from baselines.controller.reference import numbers
+from ikgym import scenarios
+from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.outcome import Outcome
+from ikgym.scenarios import Scenario
+from ikgym.simulator import Simulator
+from ikgym.validation import FloatArray, number, whole_number
+
+#: Messages in a row that may be lost, and the share of a period after which one counts as lost: those of libfranka.
+MOST_LOST, DEADLINE = 20, 0.3
+#: Commands may exceed their limits by this share, and by a rounding in [rad/s] or [m/s].
+SLACK, ROUNDING = 1e-3, 1e-9
+
+
+class Reflex(enum.StrEnum):
+    """Why an arm has stopped itself."""
+
+    VELOCITY = "a commanded velocity is above its limit"
+    ACCELERATION = "the commanded velocity jumps: its acceleration is above the limit"
+    JERK = "the commanded acceleration jumps: its jerk is above the limit"
+    COMMUNICATION = "too many messages in a row are lost or late"
+    POSITION = "a joint comes near its stop too fast to brake"
+    NOT_FINITE = "a command is not finite"
+
+
+class State(NamedTuple):
+    """What the arm reports in each period.
+
+    Attributes:
+        time: Since the start, in [s].
+        q: Measured joint coordinates in [rad] or [m]. Shape (n,).
+        commanded: The joint velocities that it has taken for the last command, in [rad/s] or [m/s]: where a message was
+            lost, the velocity before, changed as in the period before. Shape (n,).
+        reflex: Why the arm has stopped itself; None if it has not.
+    """
+
+    time: float
+    q: FloatArray
+    commanded: FloatArray
+    reflex: Reflex | None
+
+
+class ArmInterface:
+    """The arm's side of the interface, one period after the other, in simulated time.
+
+    Args:
+        scenario: Arm, drives and encoders (its plant), and the period Δt, as :func:`ikgym.scenarios.find` takes it.
+        jitter: Standard deviation of the delay of a message, as a share of the period. A message that is later than 0.3
+            periods is lost.
+        lost: Share of the messages that are lost.
+        seed: Of drives, noise, jitter and lost messages.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    def __init__(self, scenario: str | Scenario, *, jitter: float = 0.0, lost: float = 0.0, seed: int = 0) -> None:
+        self.scenario = scenarios.find(scenario)
+        self._jitter = number("jitter", jitter, at_least=0.0)
+        self._lost = number("lost", lost, at_least=0.0, at_most=1.0)
+        seed = whole_number("seed", seed, at_least=0)
+        self._rng = np.random.default_rng([seed, 1])
+        self._simulator = Simulator(self.scenario.replace(collisions=False, obstacles=()), None, 1)
+        drawn = [seeding.np_random(seed)[0]]
+        self._out: Outcome = self._reset(drawn)
+        n, arm, dt = self.scenario.joints, self.scenario.arm, self.scenario.dt
+        self._command, self._change = np.zeros(n), np.zeros(n)
+        self._periods, self._missed = 0, 0
+        self._reflex: Reflex | None = None
+        self._bounds = np.array([arm.velocity_limit, dt * arm.acceleration_limit, dt * dt * arm.jerk_limit])
+        self._bounds = (1.0 + SLACK) * self._bounds + ROUNDING
+
+    def _reset(self, generators: list[np.random.Generator]) -> Outcome:
+        self._simulator.reset(np.ones(1, dtype=np.bool_), generators)
+        return self._simulator.observe()
+
+    @property
+    def state(self) -> State:
+        """The state at the end of the last period."""
+        time_made = self._periods * self.scenario.dt
+        return State(time_made, self._out.q[0].copy(), self._command.copy(), self._reflex)
+
+    @property
+    def true_q(self) -> FloatArray:
+        """The true joint coordinates in [rad] or [m]. Shape (n,)."""
+        q: FloatArray = self._simulator.true_q[0]
+        return q
+
+    def cycle(self, command: FloatArray | None) -> State:
+        """One period.
+
+        Args:
+            command: The message of this period: joint velocities in [rad/s] or [m/s]; None where there is none.
+        """
+        late = self._jitter * abs(self._rng.standard_normal()) > DEADLINE
+        if command is None or late or self._rng.random() < self._lost:
+            self._missed += 1
+            wanted = self._command + self._change
+            limit = self.scenario.arm.velocity_limit
+            wanted = np.clip(wanted, -limit, limit)
+        else:
+            self._missed, wanted = 0, command
+        if self._reflex is None:
+            self._reflex = self._refused(wanted)
+        if self._reflex is not None:  # brakes as hard as it can
+            most = np.minimum(self._bounds[1], np.abs(self._command))
+            wanted = self._command - np.copysign(most, self._command)
+        self._change, self._command = wanted - self._command, wanted
+        self._out = self._simulator.step(wanted / self.scenario.velocity_limit)
+        self._periods += 1
+        return self.state
+
+    def _refused(self, wanted: FloatArray) -> Reflex | None:
+        """The reflex that a command starts; None if it is fine."""
+        if not np.isfinite(wanted).all():
+            return Reflex.NOT_FINITE
+        if self._missed > MOST_LOST:
+            return Reflex.COMMUNICATION
+        change = wanted - self._command
+        kinds = (Reflex.VELOCITY, wanted), (Reflex.ACCELERATION, change), (Reflex.JERK, change - self._change)
+        for bound, (reflex, value) in zip(self._bounds, kinds, strict=True):
+            if (np.abs(value) > bound).any():
+                return reflex
+        arm, dt, q = self.scenario.arm, self.scenario.dt, self.true_q
+        speed = self._out.qdot[0]
+        room = np.where(speed > 0.0, arm.upper - q, q - arm.lower)
+        with np.errstate(invalid="ignore"):
+            way = np.where(np.isfinite(arm.acceleration_limit), 0.5 * speed**2 / arm.acceleration_limit, 0.0)
+        return Reflex.POSITION if (way - dt * np.abs(speed) > np.maximum(room, 0.0)).any() else None
+
+
+class MockArm:
+    """An arm at the other end of a connection: a process of its own that keeps its period, whatever its user does.
+
+    >>> with MockArm("panda-circle") as arm:
+    ...     state = arm.read()
+    ...     arm.write(np.zeros(7))
+
+    Args:
+        scenario: See :class:`ArmInterface`; likewise ``jitter``, ``lost`` and ``seed``.
+        real_time: Whether it is a process that runs in real time. If not, :meth:`read` makes one period, with the
+            command that was written since the last one: for many runs in little time, with the same code.
+
+    Raises:
+        InvalidInputError: A number is out of its range.
+    """
+
+    def __init__(self, scenario: str | Scenario, *, real_time: bool = True, **options: Any) -> None:
+        self._interface = ArmInterface(scenario, **options)
+        self._joints, self._begun = self._interface.scenario.joints, False
+        self._command: FloatArray | None = None
+        self._pipe: Any = None
+        self._process: Any = None
+        if real_time:
+            context = multiprocessing.get_context("spawn")
+            self._pipe, far = context.Pipe()
+            arguments = far, self._interface.scenario, options
+            self._process = context.Process(target=_run, args=arguments, daemon=True)
+            self._process.start()
+            far.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def read(self) -> State:
+        """The newest state; waits for it in real time.
+
+        Raises:
+            InvalidInputError: The arm was switched off.
+        """
+        if self._process is None:
+            begun, self._begun = self._begun, True
+            command, self._command = self._command, None
+            return self._interface.cycle(command) if begun else self._interface.state
+        try:
+            state: State = self._pipe.recv()
+            while self._pipe.poll():
+                state = self._pipe.recv()
+        except (EOFError, OSError):
+            raise InvalidInputError("read: expected an arm that is switched on.") from None
+        return state
+
+    def write(self, qdot: npt.ArrayLike) -> None:
+        """Sends joint velocities in [rad/s] or [m/s]. Shape (n,).
+
+        Raises:
+            InvalidInputError: The shape is another one, or the arm was switched off.
+        """
+        command = numbers("qdot", qdot, (self._joints,))
+        if self._process is None:
+            self._command = command
+            return
+        try:
+            self._pipe.send(command)
+        except OSError:
+            raise InvalidInputError("write: expected an arm that is switched on.") from None
+
+    def stop(self) -> None:
+        """Switches the arm off."""
+        if self._process is not None:
+            self._pipe.close()
+            self._process.join(5.0)
+            self._process.kill()
+
+
+def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
+    """The process of an arm: a period after the other in real time, with the newest command that has come."""
+    arm = ArmInterface(scenario, **options)
+    arm.cycle(np.zeros(scenario.joints))  # compiles
+    arm, period = ArmInterface(scenario, **options), scenario.dt
+    state, begun = arm.state, False
+    try:
+        pipe.send(state)
+        due = time.perf_counter()
+        while True:
+            due += period
+            command = None
+            while (left := due - time.perf_counter()) > 0.0 or pipe.poll():
+                if pipe.poll(max(left, 0.0)):
+                    command = pipe.recv()
+            begun = begun or command is not None  # nobody is late before the first command
+            pipe.send(arm.cycle(command if begun else np.zeros(scenario.joints)))
+    except (EOFError, OSError):
+        return
