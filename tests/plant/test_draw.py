@@ -182,7 +182,7 @@ def test_the_drawn_plant_is_the_one_that_moves(name):
         for loaded, arm in enumerate((drawn.arm, drawn.loaded_arm)):
             for part in ("offsets", "axes", "tool", "tool_rotation"):
                 assert identical(getattr(rows.arms, part)[0, loaded], getattr(arm, part))
-        assert rows.state.delay[0] == drawn.command_delay
+        assert (rows.state.delay[0] == drawn.command_delay).all()
         assert rows.state.lag[0] == pytest.approx(1.0 - np.exp(-2 * np.pi * drawn.bandwidth * 1e-3), rel=1e-12)
         assert drawn.payload_step == 7
 

@@ -14,7 +14,7 @@ def test_each_effect_switches_the_plant_on():
     assert Plant(payload_step=5).ideal
     assert repr(Plant()) == "Plant()"
     assert Plant(calibration=2.0, load=(1, 3)).ideal
-    assert {*ON, "payload_step", "calibration", "load", "from_middle"} == {
+    assert {*ON, "payload_step", "resonance_damping", "calibration", "load", "from_middle"} == {
         field.name for field in dataclasses.fields(Plant)
     }
     for name, plant in ON.items():

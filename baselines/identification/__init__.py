@@ -1,0 +1,1 @@
+"""Drives of an arm, identified from a log of its motion: excite, read, fit, report."""
