@@ -13,6 +13,7 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 COMMANDS = {
     "evaluate": "play policies on scenarios: table, files and plots",
     "path": "say whether a path can be driven, from which start, how fast",
+    "identify": "find the drives of an arm in a log of its motion",
     "compare": "recommend a solver for an arm and a path",
     "train": "train an agent",
     "tune": "search settings of solvers",

@@ -30,7 +30,16 @@ CONSOLE = "ikgym"
 EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "rich", "optuna", "yaml"), "train"),
     **dict.fromkeys(("trimesh", "viser", "yourdfpy"), "view"),
-    **{"h5py": "data", "minari": "data", "pinocchio": "urdf", "toppra": "paths", "moviepy": "video", "ray": "cluster"},
+    **{
+        "h5py": "data",
+        "minari": "data",
+        "pinocchio": "urdf",
+        "toppra": "paths",
+        "scipy": "paths",
+        "rosbags": "paths",
+        "moviepy": "video",
+        "ray": "cluster",
+    },
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import time
 from collections.abc import Sequence
 
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.controller import kernels
-from baselines.controller.drives import IDENTIFY, LONGEST, Drives, identified, policy_for
+from baselines.controller.drives import IDENTIFY, LONGEST, Drives, drives_of, identified, policy_for
 from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers, obstacle_rows
 from baselines.controller.timing import Timing, timing_of
@@ -64,7 +65,7 @@ class Controller:
         scenario: Model, task, Δt and velocity limit, as :func:`ikgym.scenarios.find` takes it.
         policy: The policy, as text such as ``"qp:damping=1e-4"``, as a pair of name and parameters, or made for the
             scenario.
-        drives: The drives, or ``"identify"``.
+        drives: The drives, ``"identify"``, or a file ending in .toml that ``ikgym identify`` wrote.
         guards: The guards.
         steps: Control periods until the end of the task, for policies that look at it; no end in sight if left out.
 
@@ -78,7 +79,7 @@ class Controller:
         self,
         scenario: str | Scenario,
         policy: PolicySpec | SolverPolicy = "qp",
-        drives: Drives | str = IDENTIFY,
+        drives: Drives | str | os.PathLike[str] = IDENTIFY,
         *,
         guards: Guards | None = None,
         steps: int | None = None,
@@ -86,6 +87,7 @@ class Controller:
         if guards is not None and not isinstance(guards, Guards):
             raise InvalidInputError(f"guards: expected Guards(…) or None, got {shortened(guards)}.")
         self._scenario, self._guards = scenarios.find(scenario), Guards() if guards is None else guards
+        drives = drives_of(drives, self._scenario)
         self.policy = policy_for(self._scenario, policy, drives, self._guards)
         if self.policy.reference and steps is None:
             raise InvalidInputError(f"{self.policy.name} has privileged information on one episode: give its steps.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,7 @@ from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.plant.checks import PerJoint, joint_numbers
+from ikgym.plant.identified import IdentifiedPlant
 from ikgym.scenarios import Scenario
 from ikgym.validation import LARGEST, FloatArray, per_joint, shortened
 
@@ -106,6 +108,19 @@ class IdentifiedDrives(Drives):
             numbers = f"{delay[j]:.2f} periods of delay, {1e3 * constant[j]:.3g} ms of lag"
             lines.append(f"joint {j + 1}: {least}{numbers}{guessed}")
         return "\n".join(lines)
+
+
+def drives_of(drives: Drives | str | os.PathLike[str], scenario: Scenario) -> Drives | str:
+    """The drives in a file that ``ikgym identify`` wrote, where drives are named by one.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or belongs to another arm or control period.
+    """
+    if isinstance(drives, Drives) or drives == IDENTIFY or not str(drives).endswith(".toml"):
+        return drives  # type: ignore[return-value]  # refused later if it is neither
+    found = IdentifiedPlant.load(drives)
+    found.plant_for(scenario.arm, scenario.dt)
+    return Drives(found.delay, found.time_constant)
 
 
 def half_period(constant: FloatArray) -> FloatArray:

@@ -10,10 +10,11 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
-#: The motion repeats itself after so many seconds. Highest frequency in [Hz], and how many there are for each joint.
-REPEAT, HIGHEST, SINES = 5.0, 25.0, 20
+#: The motion repeats itself after so many seconds. Highest frequency in parts of the control rate, and how many
+#: frequencies there are for each joint.
+REPEAT, HIGHEST, SINES = 5.0, 0.4, 28
 #: Draws of phases, of which those with the lowest peak of acceleration are taken.
-DRAWS = 200
+DRAWS = 30
 #: Seconds in which the motion fades in and out, and the amplitude of its first, gentle quarter.
 FADE, GENTLE = 1.0, 0.25
 #: Smallest distance of bodies in [m], and amplitudes that are tried until it is kept.
@@ -40,19 +41,19 @@ def excite(arm: Arm, seconds: float, period: float, share: float = 0.4, seed: in
         InvalidInputError: A number is out of its range, a velocity limit is missing, or no motion keeps the arm clear
             of itself.
     """
-    number("seconds", seconds, at_least=5.0, at_most=600.0)
+    number("seconds", seconds, at_least=5.0, at_most=120.0)
     number("share", share, at_least=0.01, at_most=0.9)
-    if number("period", period, above=0.0, at_most=0.05) * HIGHEST > 0.4:
-        raise InvalidInputError(f"period: expected at most {1e3 * 0.4 / HIGHEST:g} ms, got {1e3 * period:g} ms.")
+    highest = HIGHEST / number("period", period, at_least=5e-4, at_most=0.02)
     if not np.isfinite(arm.velocity_limit).all():
         raise InvalidInputError(f"expected an arm with limits of velocity, {arm.name} lacks them.")
+    home: FloatArray = np.asarray(arm.home)
     n, k = arm.joints, round(seconds / period)
     t, rng = period * np.arange(k), np.random.default_rng(seed)
-    multiples = np.geomspace(2.0, HIGHEST * REPEAT - n, SINES).round()[:, None] + np.arange(n)
+    multiples = np.geomspace(2.0, highest * REPEAT - n, SINES).round()[:, None] + np.arange(n)
     omega = 2.0 * np.pi / REPEAT * multiples
     size = 1.0 / np.sqrt(1.0 + (omega / (2.0 * np.pi * 1.5)) ** 2)
-    phase = _calm_phases(omega, size * omega, rng)
-    waves = sum(a * np.sin(w * t[:, None] + p) for a, w, p in zip(size, omega, phase, strict=True))
+    phase = _calm_phases(omega, size * omega, rng, period)
+    waves = (size[:, None] * np.sin(omega[:, None] * t[:, None] + phase[:, None])).sum(axis=0)
     gentle, end = 0.25 * seconds, seconds - FADE
     envelope = np.interp(t, [0.0, FADE, gentle, gentle + FADE], [0.0, GENTLE, GENTLE, 1.0])
     envelope *= np.interp(t, [end - FADE, end], [1.0, 0.0])
@@ -61,7 +62,7 @@ def excite(arm: Arm, seconds: float, period: float, share: float = 0.4, seed: in
     qdot -= within[:, None] * (qdot.sum(axis=0) / within.sum())  # ends where it began
     acceleration = np.where(np.isfinite(arm.acceleration_limit), arm.acceleration_limit, 4.0 * arm.velocity_limit)
     travel = np.abs(np.cumsum(qdot, axis=0)).max(axis=0) * period
-    room = np.minimum(arm.upper - arm.home, arm.home - arm.lower)
+    room = np.minimum(arm.upper - home, home - arm.lower)
     room = np.where(np.isfinite(room), room, np.pi)
     most = np.array([
         arm.velocity_limit / np.abs(qdot).max(axis=0),
@@ -71,19 +72,19 @@ def excite(arm: Arm, seconds: float, period: float, share: float = 0.4, seed: in
     qdot *= share * most.min(axis=0)
     for smaller in SMALLER:
         command = smaller * qdot
-        q = arm.home + period * np.concatenate([np.zeros((1, n)), np.cumsum(command, axis=0)[:-1]])
+        q = home + period * np.concatenate([np.zeros((1, n)), np.cumsum(command, axis=0)[:-1]])
         if _clear(arm, q[:: max(1, round(0.01 / period))]):
             return q, command
     raise InvalidInputError(f"expected a motion of {arm.name} around its home that touches nothing, found none.")
 
 
-def _calm_phases(omega: FloatArray, size: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _calm_phases(omega: FloatArray, size: FloatArray, rng: np.random.Generator, period: float) -> FloatArray:
     """Phases of sines with the lowest peak of their sum that some draws find. Shapes (s, n)."""
-    t = np.linspace(0.0, REPEAT, round(8.0 * HIGHEST * REPEAT))[:, None]
+    t = np.arange(0.0, REPEAT, period)[:, None]
     best, lowest = np.zeros_like(omega), np.full(omega.shape[1], np.inf)
     for _ in range(DRAWS):
         phase = rng.uniform(0.0, 2.0 * np.pi, omega.shape)
-        peak = np.abs(sum(a * np.cos(w * t + p) for a, w, p in zip(size, omega, phase, strict=True))).max(axis=0)
+        peak = np.abs((size[:, None] * np.cos(omega[:, None] * t + phase[:, None])).sum(axis=0)).max(axis=0)
         best, lowest = np.where(peak < lowest, phase, best), np.minimum(peak, lowest)
     return best
 

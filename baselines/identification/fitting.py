@@ -1,8 +1,8 @@
 """Fits of drives to a log, joint by joint, by the error of their outputs in free run.
 
-Commands and measured velocities pass the same filter, a leaky integral: its outputs are joint coordinates without their
-slow part, in which the noise of encoders is white and drift by gravity and friction counts little. As models are linear,
-filtered commands give filtered outputs.
+Commands and measured velocities pass the same filter, a leaky integral: its outputs are joint coordinates without
+their slow part, in which the noise of encoders is white and drift by gravity and friction counts little. As models are
+linear, filtered commands give filtered outputs.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.signal import lfilter
 
@@ -29,6 +30,8 @@ BLOCK = 2.0
 BETTER = 0.8
 #: Errors of the lag below this share of the motion need no drive of low order.
 SMALL = 3e-4
+#: Order of the autoregressive filter that whitens what a lag leaves, so that all frequencies count.
+ORDER = 8
 #: Iterations of Steiglitz and McBride (1965).
 ITERATIONS = 8
 
@@ -41,13 +44,13 @@ class Lag:
         delay: In periods.
         time_constant: T in [s], 0 for none: a step closes the share 1 − exp(−Δt/T) of the gap.
         gain: The steady gain.
-        deviations: Standard deviations of delay, time constant and gain.
+        deviations: Standard deviations of delay, time constant, gain and latency, which is delay + T/Δt in periods.
     """
 
     delay: float
     time_constant: float
     gain: float
-    deviations: tuple[float, float, float]
+    deviations: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Joint:
         whole: Whole periods of delay before the drive of low order.
         row: Its coefficients, see :attr:`ikgym.Plant.drive`.
         errors: Rms errors in free run of lag and drive of low order on the half of the log that they were not fitted
-            to, and rms of the motion without its slow part; in [rad] or [m].
+            to, and rms of the motion; all filtered so that what the lag leaves is white.
         halves: Total latency in periods and gain in the gentle and in the excited part; None where there are none.
         friction: Speed that is lost to friction or a dead band, in [rad/s] or [m/s].
     """
@@ -97,6 +100,13 @@ class Part:
         self.y = lfilter([log.period], [1.0, -leak], velocity)
         self.block = (np.arange(len(self.u)) * log.period // BLOCK).astype(int)
         self.everything = np.ones(len(self.u), dtype=bool)
+
+    def whiten(self, rest: FloatArray) -> None:
+        """Filters commands and motion so that errors that are alike a remainder (k,) become white."""
+        lags = np.array([rest[i:] @ rest[: len(rest) - i] for i in range(ORDER + 1)]) / max(rest @ rest, 1e-300)
+        lags[0] += 1e-9
+        ahead = np.append(1.0, -solve_toeplitz(lags[:-1], lags[1:]))
+        self.u, self.y = lfilter(ahead, [1.0], self.u), lfilter(ahead, [1.0], self.y)
 
     def late(self, steps: int, signal: FloatArray | None = None) -> FloatArray:
         """The commands, or another signal, a number of periods late. Shape (k,)."""
@@ -147,7 +157,7 @@ def _refined(part: Part, whole: int, guess: float, where: FloatArray) -> tuple[f
     middle = math.log(max(guess, FASTEST))
     found = minimize_scalar(
         lambda log_t: _taps(part, whole, math.exp(log_t), where)[1],
-        bounds=(middle - 1.0, middle + 1.0),
+        bounds=(max(middle - 2.5, math.log(FASTEST)), middle + 2.5),
         method="bounded",
         options={"xatol": 1e-4},
     )
@@ -177,24 +187,29 @@ def simulate_lag(part: Part, lag: Lag) -> FloatArray:
     """Output of a lag, filtered. Shape (k,)."""
     whole = math.floor(lag.delay)
     rest = lag.delay - whole
-    return lag.gain * _lagged(part, whole, lag.time_constant) @ np.array([1.0 - rest, rest])
+    out: FloatArray = lag.gain * _lagged(part, whole, lag.time_constant) @ np.array([1.0 - rest, rest])
+    return out
 
 
-def _deviations(part: Part, delay: float, constant: float, gain: float, where: Any) -> tuple[float, float, float]:
-    """Standard deviations of delay, time constant and gain: errors within a block may depend on each other."""
+def _deviations(part: Part, delay: float, constant: float, gain: float, where: Any) -> tuple[float, ...]:
+    """Standard deviations, see :class:`Lag`: errors within a block may depend on each other."""
     base = np.array([delay, max(constant, FASTEST), gain])
 
     def output(values: FloatArray) -> FloatArray:
-        return simulate_lag(part, Lag(values[0], values[1], values[2], (0.0, 0.0, 0.0)))
+        return simulate_lag(part, Lag(values[0], values[1], values[2]))
 
     steps = np.array([1e-3, 1e-3 * base[1], 1e-3])
     slopes = np.stack([(output(base + step) - output(base)) / step.sum() for step in np.diag(steps)], axis=1)
+    if constant <= FASTEST:  # delay and lag are alike then
+        slopes[:, 1] = 0.0
     slopes, rest = slopes[where], (part.y - output(base))[where]
     scores = np.zeros((part.block.max() + 1, 3))
     np.add.at(scores, part.block[where], slopes * rest[:, None])
     inverse = np.linalg.pinv(slopes.T @ slopes)
-    spread = np.sqrt(np.maximum(np.diag(inverse @ (scores.T @ scores) @ inverse), 0.0))
-    return float(spread[0]), float(spread[1]), float(spread[2])
+    spread = inverse @ (scores.T @ scores) @ inverse
+    latency = np.array([1.0, 1.0 / part.period, 0.0])
+    variances = [*np.diag(spread), latency @ spread @ latency]
+    return tuple(math.sqrt(max(float(variance), 0.0)) for variance in variances)
 
 
 def simulate_drive(part: Part, whole: int, row: Any) -> FloatArray:
@@ -208,12 +223,11 @@ def _stable(a: FloatArray) -> FloatArray:
     """Coefficients whose poles are within the largest one."""
     poles = np.roots(np.append(1.0, -a))
     size = np.maximum(np.abs(poles), 1e-300)
-    return -np.poly(poles * np.minimum(1.0, 0.99 * LARGEST_POLE / size)).real[1:]
+    within: Any = np.poly(poles * np.minimum(1.0, 0.99 * LARGEST_POLE / size))
+    return np.asarray(-within.real[1:], dtype=np.float64)
 
 
-def fit_drive(
-    part: Part, lag: Lag, whole: int, where: Any = None, *, polish: bool = True
-) -> tuple[FloatArray, float]:
+def fit_drive(part: Part, lag: Lag, whole: int, where: Any = None, *, polish: bool = True) -> tuple[FloatArray, float]:
     """Coefficients of a drive of low order after whole periods of delay, and its mean square error in some rows.
 
     Iterations of Steiglitz and McBride begin from the lag; then Levenberg and Marquardt's method on the output errors.
@@ -230,13 +244,13 @@ def fit_drive(
     def residual(values: FloatArray) -> FloatArray:
         if np.abs(np.roots(np.append(1.0, -values[:VELOCITIES]))).max() > LARGEST_POLE:
             return np.full(int(where.sum()), 1e3)
-        return (simulate_drive(part, whole, values) - part.y)[where]
+        return np.asarray((simulate_drive(part, whole, values) - part.y)[where])
 
     def slopes(values: FloatArray) -> FloatArray:
         bottom = np.append(1.0, -values[:VELOCITIES])
         out, u = simulate_drive(part, whole, values), part.late(whole)
         columns = [part.late(i + 1, out) for i in range(VELOCITIES)] + [part.late(i, u) for i in range(COMMANDS)]
-        return np.asarray(lfilter([1.0], bottom, np.stack(columns), axis=1)).T[where]
+        return np.asarray(np.asarray(lfilter([1.0], bottom, np.stack(columns), axis=1)).T[where])
 
     starts = [row]
     for _ in range(ITERATIONS):
@@ -250,7 +264,11 @@ def fit_drive(
         return begin, float(np.square(residual(begin)).mean())
     scale = 1.0 / max(float(np.sqrt(np.square(part.y[where]).mean())), 1e-300)
     found = least_squares(
-        lambda values: scale * residual(values), begin, jac=lambda values: scale * slopes(values), method="lm", max_nfev=60
+        lambda values: scale * residual(values),
+        begin,
+        jac=lambda values: scale * slopes(values),
+        method="lm",
+        max_nfev=60,
     ).x
     best = min((begin, found), key=lambda values: float(np.square(residual(values)).sum()))
     return best, float(np.square(residual(best)).mean())
@@ -261,9 +279,13 @@ def fit_joint(log: Log, joint: int, name: str, limit: float) -> Joint:
     part = Part(log, joint)
     lag = fit_lag(part)
     moved = bool(np.abs(part.command).max() > 1e-3 * min(limit, 1.0) and lag.gain > 0.0)
-    moved = moved and lag.deviations[0] < 0.5 and lag.deviations[2] < 0.2 * lag.gain
+    moved = moved and lag.deviations[3] < 0.5 and lag.deviations[2] < 0.05 * lag.gain
     if not moved:
         return Joint(name, False, lag, 0, (), (0.0, 0.0, 0.0), None, 0.0)
+    halves, friction = _halves(part), _friction(part, lag)
+    if (rest := part.y - simulate_lag(part, lag)).any():
+        part.whiten(rest)
+        lag = fit_lag(part)
     half, size = part.block % 2 == 0, float(np.sqrt(np.square(part.y).mean()))
     first = fit_lag(part, half)
     whole = _best_delay(part, lag)
@@ -273,7 +295,7 @@ def fit_joint(log: Log, joint: int, name: str, limit: float) -> Joint:
         for out in (simulate_lag(part, first), simulate_drive(part, whole, fit_drive(part, lag, whole, half)[0]))
     ]
     coefficients = tuple(row.tolist())
-    return Joint(name, True, lag, whole, coefficients, (*errors, size), _halves(part), _friction(part, lag))  # type: ignore[arg-type]
+    return Joint(name, True, lag, whole, coefficients, (*errors, size), halves, friction)  # type: ignore[arg-type]
 
 
 def _best_delay(part: Part, lag: Lag) -> int:

@@ -21,6 +21,7 @@ from ikgym import arms, problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.obstacles import Box
+from ikgym.plant.identified import IdentifiedPlant
 from ikgym.registry import Registry, import_object
 from ikgym.scenarios import files
 from ikgym.scenarios.preview import Preview
@@ -65,7 +66,8 @@ def load(file: str | os.PathLike[str]) -> Scenario:
 
     Args:
         file: A TOML file, as :meth:`Scenario.save` writes it. Paths of other files in it are relative to it. With the
-            key `like`, the name of another scenario, all missing keys are those of that scenario.
+            key `like`, the name of another scenario, all missing keys are those of that scenario. The key
+        `plant` is a table, or the name of a file that ``ikgym identify`` wrote.
 
     Returns:
         The scenario, checked like one that is made in Python.
@@ -76,15 +78,23 @@ def load(file: str | os.PathLike[str]) -> Scenario:
         UnknownNameError: There is no such key, arm, task or kind of trajectory; the message has the nearest one.
         MissingDependencyError: An arm comes from a URDF file, and Pinocchio is not installed.
     """
-    table = read_user_toml(file)
+    table, plant = read_user_toml(file), None
+    if isinstance(table.get("plant"), str):  # identified, see :mod:`ikgym.plant.identified`
+        plant = IdentifiedPlant.load(pathlib.Path(file).parent / table.pop("plant"))
     with files.add_location("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
         if base is None:
-            return Scenario(**fields)
+            return _with_plant(Scenario(**fields), plant)
         if "trajectory" in fields and duration(fields["trajectory"]) is not None:
             fields.setdefault("steps", None)  # those of the new path
-        return base.replace(**fields)
+        return _with_plant(base.replace(**fields), plant)
+
+
+def _with_plant(scenario: Scenario, identified: IdentifiedPlant | None) -> Scenario:
+    if identified is None:
+        return scenario
+    return scenario.replace(plant=identified.plant_for(scenario.arm, scenario.dt))
 
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
