@@ -18,6 +18,7 @@ import itertools
 import shutil
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
@@ -58,6 +59,8 @@ class Command:
     """Names of CSV files without their end, such as pose, cost_time or compare."""
     new: bool = False
     """Measure only lines that have no cost ratio yet."""
+    bench: Path | None = None
+    """Folder of the arm with masses that the table `drives` is measured on, see :mod:`docs.drives`."""
 
 
 def measured(name: str, *, only_new: bool = False) -> list[Line]:
@@ -168,7 +171,7 @@ def _adaptive(line: Line) -> Line:
     return {**line, **{column: found[column] for column in ("cost_ratio", "low", "high", "worst")}}
 
 
-def table_of(name: str, *, only_new: bool = False) -> list[Line]:
+def table_of(name: str, *, only_new: bool = False, bench: Path | None = None) -> list[Line]:
     """A table: that of the module `docs.NAME` where there is one, else by the lines of its CSV file.
 
     Raises:
@@ -186,13 +189,13 @@ def table_of(name: str, *, only_new: bool = False) -> list[Line]:
         return list(measure(only_new=only_new))
     if only_new:
         raise SystemExit(f"{name}: this table is measured as a whole; leave --new out.")
-    return list(measure())
+    return list(measure(bench) if "bench" in inspect.signature(measure).parameters else measure())
 
 
 def main(command: Command) -> None:
     """Writes the tables."""
     for name in command.tables:
-        keep(name, table_of(name, only_new=command.new))
+        keep(name, table_of(name, only_new=command.new, bench=command.bench))
         for folder in WORK.glob(f"{name}-*"):  # or the next measurement would have these times
             shutil.rmtree(folder)
 

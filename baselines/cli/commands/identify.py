@@ -88,7 +88,7 @@ def _work(options: Options, _: str) -> None:
     found = identify(log, arm)
     seconds = log.period * (len(log.q) - 1)
     print(f"{arm.name}: {seconds:.4g} s at a control period of {1e3 * log.period:.4g} ms\n")
-    print(shell.aligned(found.table(test), shell.width()))
+    print(shell.align(found.table(test), shell.width()))
     print("".join(f"\nwarning: {line}" for line in found.warnings()), end="")
     if options.out is not None:
         found.save(options.out)

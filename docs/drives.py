@@ -1,0 +1,82 @@
+"""The table `drives`: costs on an arm with masses, friction and servos, predicted by plants that a log identified.
+
+``python -m docs.measure drives --bench FOLDER``. The folder is a test bench, which is no part of this project: its
+module ``plant`` has ``Torque(servo, late=, payload=)`` with ``begin(q)``, ``move(command, dt, k)`` and ``state``, and
+``use(plant)``, which puts such an arm below the commanded velocities of all episodes, or None for the scenario's plant.
+"""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import baselines
+import ikgym
+from baselines.episodes import rollouts
+from baselines.identification.excitation import excite
+from baselines.identification.log import Log
+from baselines.identification.report import Identified, identify
+from baselines.spec import parse_policy
+from docs.keeping import Line
+
+POLICIES = ("qp", "qp:gain=0.3", "qp:gain=0.1", "sns", "dls", "predicted", "predicted:policy=qp,gain=0.3")
+SERVOS, LATE, PAYLOADS = ("velocity", "position", "stiff"), (0, 2), (0.0, 2.0)
+SCENARIO, PERIOD, STEPS, SECONDS = "panda-random", 0.002, 600, 30.0
+
+
+def record(bench: Any, arm: ikgym.Arm, servo: Any) -> Log:
+    """The log of one motion that excites an arm of the bench."""
+    _, command = excite(arm, SECONDS, PERIOD)
+    servo.begin(np.array(arm.home)[None])
+    q = []
+    for k, row in enumerate(command):
+        q.append(servo.state[0][0].copy())
+        servo.move(row[None], PERIOD, k)
+    return Log(PERIOD, np.array(q), command)
+
+
+def plants(found: Identified) -> dict[str, ikgym.Plant]:
+    """The plants that predict: the ideal one, one lag and delay for all joints, and what was identified."""
+    lags = [joint.lag for joint in found.joints]
+    delay, constant, gain = (
+        float(np.median([getattr(one, key) for one in lags])) for key in ("delay", "time_constant", "gain")
+    )
+    bandwidth = 1.0 / (2.0 * math.pi * constant) if constant > 0.0 else math.inf
+    lag = ikgym.Plant(command_delay=delay, bandwidth=bandwidth, gain=gain)
+    return {"ideal": ikgym.Plant(), "lag": lag, "identified": found.plant.plant}
+
+
+def play(scenario: ikgym.Scenario, policy: str, seed: int) -> tuple[float, float]:
+    """The mean stage cost of an episode, and its largest position error in [mm]."""
+    name, parameters = parse_policy(policy)
+    [episode] = rollouts(scenario, baselines.make(name, scenario, **parameters), [seed])
+    cost = episode.tracking_cost.mean() + episode.velocity_cost.mean()
+    return float(cost), 1e3 * float(episode.position_error.max())
+
+
+def measured(folder: Path) -> list[Line]:
+    """The table."""
+    sys.path.insert(0, str(folder))
+    bench = importlib.import_module("plant")
+    [seed] = ikgym.scenarios.seeds("validation", 1)
+    usual = ikgym.scenarios.get(SCENARIO).replace(dt=PERIOD, steps=STEPS)
+    table: list[Line] = []
+    for kind, late, payload in itertools.product(SERVOS, LATE, PAYLOADS):
+        servo = {"late": late, "payload": payload}
+        known = plants(identify(record(bench, usual.arm, bench.Torque(kind, **servo)), usual.arm))
+        for policy in POLICIES:
+            bench.use(None)
+            costs = {name: play(usual.replace(plant=plant), policy, seed)[0] for name, plant in known.items()}
+            bench.use(bench.Torque(kind, **servo))
+            cost, error = play(usual, policy, seed)
+            case: Line = {"servo": kind, "late": late, "payload_kg": payload, "policy": policy}
+            table.append(case | {"true_cost": cost, **costs, "error_mm": error})
+            print(table[-1], file=sys.stderr, flush=True)
+    bench.use(None)
+    return table
