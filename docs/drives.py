@@ -25,8 +25,8 @@ from baselines.identification.report import Identified, identify
 from baselines.spec import parse_policy
 from docs.keeping import Line
 
-POLICIES = ("qp", "qp:gain=0.3", "qp:gain=0.1", "sns", "dls", "predicted", "predicted:policy=qp,gain=0.3")
-SERVOS, LATE, PAYLOADS = ("velocity", "position", "stiff"), (0, 2), (0.0, 2.0)
+POLICIES = ("qp", "qp:gain=0.3", "qp:gain=0.1", "sns", "predicted", "predicted:policy=qp,gain=0.3")
+SERVOS, LATE, PAYLOADS = ("velocity", "position", "stiff"), (0, 2), (2.0,)
 SCENARIO, PERIOD, STEPS, SECONDS = "panda-random", 0.002, 600, 30.0
 
 

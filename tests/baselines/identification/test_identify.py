@@ -51,7 +51,7 @@ def frame_of(log):
     return pd.DataFrame(columns)
 
 
-@pytest.mark.parametrize("bits", [None, 14])
+@pytest.mark.parametrize("bits", [None, pytest.param(14, marks=pytest.mark.slow)])
 def test_the_drives_of_the_simulator_are_recovered(log, bits):
     if bits:
         step = 2.0 * math.pi / 2**bits
