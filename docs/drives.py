@@ -30,7 +30,7 @@ SERVOS, LATE, PAYLOADS = ("velocity", "position", "stiff"), (0, 2), (2.0,)
 SCENARIO, PERIOD, STEPS, SECONDS = "panda-random", 0.002, 600, 30.0
 
 
-def record(bench: Any, arm: ikgym.Arm, servo: Any) -> Log:
+def record(arm: ikgym.Arm, servo: Any) -> Log:
     """The log of one motion that excites an arm of the bench."""
     _, command = excite(arm, SECONDS, PERIOD)
     servo.begin(np.array(arm.home)[None])
@@ -60,16 +60,25 @@ def play(scenario: ikgym.Scenario, policy: str, seed: int) -> tuple[float, float
     return float(cost), 1e3 * float(episode.position_error.max())
 
 
-def measured(folder: Path) -> list[Line]:
-    """The table."""
-    sys.path.insert(0, str(folder))
-    bench = importlib.import_module("plant")
+def measured(bench: Path | None) -> list[Line]:
+    """The table, measured on the test bench in a folder.
+
+    Raises:
+        SystemExit: No folder is given.
+    """
+    if bench is None:
+        raise SystemExit("drives: this table needs --bench FOLDER, see docs/drives.py.")
+    sys.path.insert(0, str(bench.resolve()))
+    return _measured(importlib.import_module("plant"))
+
+
+def _measured(bench: Any) -> list[Line]:
     [seed] = ikgym.scenarios.seeds("validation", 1)
     usual = ikgym.scenarios.get(SCENARIO).replace(dt=PERIOD, steps=STEPS)
     table: list[Line] = []
     for kind, late, payload in itertools.product(SERVOS, LATE, PAYLOADS):
         servo = {"late": late, "payload": payload}
-        known = plants(identify(record(bench, usual.arm, bench.Torque(kind, **servo)), usual.arm))
+        known = plants(identify(record(usual.arm, bench.Torque(kind, **servo)), usual.arm))
         for policy in POLICIES:
             bench.use(None)
             costs = {name: play(usual.replace(plant=plant), policy, seed)[0] for name, plant in known.items()}
