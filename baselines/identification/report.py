@@ -143,7 +143,7 @@ class Identified:
         axes = figure.subplots(len(self.joints), 1, sharex=True, squeeze=False)[:, 0]
         for j, ax in enumerate(axes):
             part, out = self.simulate(j)
-            blocks = np.bincount(part.block, np.square(part.command))
+            blocks = np.bincount(part.block, np.square(self.log.command[:-1]).sum(axis=1))
             rows = np.flatnonzero(part.block == int(np.argmax(blocks)))
             time = self.log.period * rows
             leak = math.exp(-2.0 * math.pi * 0.3 * self.log.period)
