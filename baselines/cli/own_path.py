@@ -35,6 +35,8 @@ class RobotOptions(Frozen):
     """Tool point in the frame of the tip, in [m]."""
     acceleration: Annotated[tuple[float, ...], tyro.conf.arg(metavar="A …")] = ()
     """Acceleration limit, or one a joint, in [rad/s²] or [m/s²]; a URDF file states none."""
+    jerk: Annotated[tuple[float, ...], tyro.conf.arg(metavar="J …")] = ()
+    """Limit of jerk, or one a joint, in [rad/s³] or [m/s³]; that of the arm if left out, where it states one."""
 
     packages: Annotated[tuple[str, ...], tyro.conf.arg(metavar="DIR …")] = ()
     """Folders in which packages of meshes are searched, before those above the URDF file."""
@@ -44,8 +46,8 @@ class RobotOptions(Frozen):
     def robot(self, name: str) -> Arm:
         """The arm of a URDF file, or of the catalogue by its name."""
         if not name.endswith(".urdf"):
-            return self.with_acceleration(arms.get(name))
-        return self.with_acceleration(
+            return self.with_limits(arms.get(name))
+        return self.with_limits(
             arms.from_urdf(
                 name,
                 base=self.base,
@@ -56,16 +58,19 @@ class RobotOptions(Frozen):
             )
         )
 
-    def with_acceleration(self, arm: Arm) -> Arm:
-        """The arm with the acceleration limits that are given; the same where none are."""
-        if not self.acceleration:
-            return arm
-        limit = self.acceleration[0] if len(self.acceleration) == 1 else self.acceleration
-        return arm.replace(acceleration_limit=per_joint("--acceleration", limit, arm.joints))
+    def with_limits(self, arm: Arm) -> Arm:
+        """The arm with the limits of acceleration and jerk that are given; the same where none are."""
+        given = {"acceleration": self.acceleration, "jerk": self.jerk}
+        limits = {
+            f"{name}_limit": per_joint(f"--{name}", values[0] if len(values) == 1 else values, arm.joints)
+            for name, values in given.items()
+            if values
+        }
+        return arm.replace(**limits) if limits else arm
 
 
 #: The names of these options.
-ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--packages", "--bodyless", "--acceleration")
+ROBOT_OPTIONS = ("--base", "--tip", "--tool", "--packages", "--bodyless", "--acceleration", "--jerk")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,8 +130,10 @@ def scenario_of(options: OwnPath) -> Scenario:
         return _from_csv(options)
     scenario = scenarios.find(options.file)
     changes: dict[str, Any] = {} if options.dt is None else {"dt": options.dt}
-    if options.acceleration:
-        changes["arm"] = options.with_acceleration(scenario.arm)
+    if options.acceleration or options.jerk:
+        changes["arm"] = options.with_limits(scenario.arm)
+    if options.jerk:
+        changes["jerk_limit"] = None  # that of the arm
     return scenario.replace(**changes) if changes else scenario
 
 

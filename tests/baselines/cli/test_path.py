@@ -284,3 +284,44 @@ def test_a_file_without_obstacles_is_no_free_space(text, message, capsys):
     Path("room.toml").write_text(text)
     assert main([*WELD, "--speed", "0.1", "--obstacles", "room.toml"]) == (0 if message is None else 2)
     assert message is None or message in capsys.readouterr().err
+
+
+def shares(scenario, jerk):
+    """The largest shares of the limits of velocity, acceleration and jerk in the motion of `qp`, from rest on."""
+    qdot = baselines.track(scenario, "qp").qdot
+    rest = np.zeros((1, qdot.shape[1]))
+    changes = np.diff(qdot, axis=0, prepend=rest)
+    steps, arm, dt = np.diff(changes, axis=0, prepend=rest), scenario.arm, scenario.dt
+    return [
+        float((np.abs(values) / limit).max())
+        for values, limit in (
+            (qdot, arm.velocity_limit),
+            (changes, dt * arm.acceleration_limit),
+            (steps, dt * dt * jerk),
+        )
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "jerk"),
+    [
+        ("panda-line", ["2000"]),
+        *(
+            pytest.param(name, ["7500", "3750", "5000", "6250", "7500", "10000", "10000"], marks=pytest.mark.slow)
+            for name in ("panda-circle", "panda-square", "panda-lemniscate", "panda-line")
+        ),
+    ],
+)
+def test_a_stated_jerk_is_kept_by_the_retimed_path(name, jerk, capsys):
+    """At most 1.3 times as slow as without, at the Panda's limits."""
+    seconds, used, limit = [], [], np.array(jerk, dtype=float)
+    for limits in ([], ["--jerk", *jerk]):
+        assert main(["path", name, "--fastest", "--retime", "out.toml", *limits]) == 0
+        scenario = ikgym.scenarios.load("out.toml")
+        seconds.append(scenario.trajectory.times[-1])
+        used.append(shares(scenario, limit))
+    assert capsys.readouterr().err == ""
+    np.testing.assert_array_equal(scenario.jerk_limit, np.broadcast_to(limit, 7))
+    assert used[0][2] > 1.1
+    assert max(used[1]) <= 1.0 + 1e-4
+    assert seconds[1] <= 1.3 * seconds[0]
