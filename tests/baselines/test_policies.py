@@ -46,7 +46,7 @@ AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym
 #: Beside the usual scenario one for each other task, and for each kind of limits.
 SCENARIOS = ("zhang3-helix", "khan8-q7q8", "tiago-raster", AXIS.name)
 #: What a policy is told of a scenario.
-PROBLEM = {"model", "task", "cost", "dt", "velocity_limit", "surroundings", "obstacles_shown"}
+PROBLEM = {"model", "task", "cost", "dt", "jerk_limit", "velocity_limit", "surroundings", "obstacles_shown"}
 every_policy = pytest.mark.parametrize("name", baselines.names())
 every_contender = pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
 
