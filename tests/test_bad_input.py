@@ -81,7 +81,7 @@ GOOD = (
     PublishedPath("rlitg-zig", 0.2),
     RandomPublishedPath("rlitg-random-00", 0.2),
     RETIMED,
-    JointPath(RETIMED, [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]),
+    JointPath(RETIMED, [0.0, 1.0], [[0.0] * 7, [1.0] * 7]),
     LINE,
     paths.Circle([0, 0, 0], 0.3),
     paths.CircularHelix([0, 0, 0], 0.3, pitch=0.1),
@@ -99,9 +99,11 @@ GOOD = (
 )
 #: Fields for which one of the values below is good: infinite limits, texts that are kept as they are.
 ALLOWED = {
-    ("Arm", field): ("none", "inf", "huge") for field in ("lower", "upper", "velocity_limit", "acceleration_limit")
+    ("Arm", field): ("none", "inf", "huge")
+    for field in ("lower", "upper", "velocity_limit", "acceleration_limit", "jerk_limit")
 } | {
     ("Scenario", "velocity_limit"): ("none",),
+    ("Scenario", "jerk_limit"): ("none", "inf", "huge"),
     ("Scenario", "model"): ("none",),
     ("Scenario", "steps"): ("none",),
     ("Scenario", "policy"): ("text",),

@@ -40,7 +40,7 @@ def shown(observation):
 
 
 def test_a_policy_is_shown_ages_and_commands_where_there_are_any():
-    assert shown(observed())[5:] == (None, None, None, None)
+    assert shown(observed())[5:] == (None, None, None, None, None)
     single = shown(observed(pose_age=[3], commands=np.ones((2, 7))))
     assert single.q_age is None
     assert identical(single.pose_age, np.array([[3.0]]))

@@ -54,7 +54,7 @@ def test_presets(tmp_path):
     (tmp_path / "mine.toml").write_text("window = \n")
     os.mkfifo(tmp_path / "pipe.toml")
     for name, message in (
-        ("mine.toml", "mine.toml: expected TOML"),
+        ("mine.toml", "mine.toml: invalid TOML"),
         ("none.toml", "Cannot read .*none.toml: No such file"),
         ("pipe.toml", "Cannot read .*pipe.toml: expected a regular file"),
     ):

@@ -25,7 +25,7 @@ def grid_of(at, steps=None, terminal=1.0) -> Grid:
 
 def model_tuple(arm, task, cost, dt, bounds) -> Model:
     """Arm, task and cost with any lower, upper and velocity limits; of the types that a policy's model has."""
-    limits = np.array([*bounds, *np.full((2, arm.joints), np.inf)])
+    limits = np.array([*bounds, *np.full((3, arm.joints), np.inf)])
     return model_of(model_block(Model(arm.chain, task.kind, cost.parameters, dt, bounds[2], limits)))
 
 
