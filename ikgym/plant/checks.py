@@ -39,7 +39,7 @@ def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
         InvalidInputError: They are no such numbers, not finite, or too large.
     """
     array = frozen_array(name, value, at_most=LARGEST)
-    if array.ndim > 1 or (not signed and (array < 0.0).any()):
+    if array.ndim > 1 or not array.size or (not signed and (array < 0.0).any()):
         least = "" if signed else " of at least 0"
         raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {shortened(array.tolist())}.")
     return float(array) if array.ndim == 0 else tuple(array.tolist())
@@ -53,7 +53,7 @@ def frequency(name: str, value: Any) -> Drawn | PerJoint:
     """
     if isinstance(value, float) and value == math.inf:
         return math.inf
-    if isinstance(value, (tuple, list, np.ndarray)) and not is_range(value):
+    if isinstance(value, (tuple, list, np.ndarray)) and len(value) and not is_range(value):
         return tuple(
             math.inf if isinstance(one, float) and one == math.inf else number(name, one, above=0.0, at_most=LARGEST)
             for one in value
@@ -98,9 +98,13 @@ def resonances(name: str, value: Any) -> PerJoint:
     Raises:
         InvalidInputError: It is none.
     """
-    array = np.array(value, dtype=object)
-    found = [frequency(name, one) for one in array.ravel().tolist()]
-    return tuple(found) if array.ndim else found[0]  # type: ignore[arg-type]  # numbers alone
+    given = value.tolist() if isinstance(value, np.ndarray) else value
+    several = isinstance(given, (tuple, list))
+    found: Any = list(given) if several else [given]
+    if not found or any(isinstance(one, (tuple, list, np.ndarray)) for one in found):
+        raise InvalidInputError(f"{name}: expected a number above 0 or one a joint, got {shortened(given)}.")
+    found = tuple(frequency(name, one) for one in found)
+    return found if several else found[0]  # type: ignore[no-any-return]  # numbers alone
 
 
 def damping(name: str, value: Any) -> PerJoint:
