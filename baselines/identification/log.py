@@ -17,6 +17,8 @@ from ikgym.validation import FloatArray
 
 #: The shortest log in [s], and the most rows.
 SHORTEST, MOST_ROWS = 4.0, 2_000_000
+#: The longest control period in [s].
+SLOWEST = 0.1
 #: Intervals between rows may differ from the control period by this share; so many of them may, as jitter.
 JITTER, RARE = 0.3, 0.02
 #: Joint coordinates may be outside the limits by this much in [rad] or [m], as encoders and stops are not exact.
@@ -67,20 +69,24 @@ def read(file: str | os.PathLike[str], arm: Arm) -> Log:
 
 
 def _csv(path: pathlib.Path, arm: Arm) -> tuple[FloatArray, dict[str, FloatArray | None]]:
+    content = io.BytesIO(read_user_file(path))
     try:
-        frame = pd.read_csv(io.BytesIO(read_user_file(path)), skipinitialspace=True, nrows=MOST_ROWS + 1)
+        frame = pd.read_csv(content, skipinitialspace=True, nrows=MOST_ROWS + 1)
     except (ValueError, pd.errors.ParserError) as error:
-        raise InvalidInputError(f"expected CSV with a line of names, got a fault: {error}.") from None
+        raise InvalidInputError(f"expected CSV with a line of names, got a fault: {str(error).strip(' .')}.") from None
     frame.columns = [str(name).strip() for name in frame.columns]
     if len(frame) > MOST_ROWS:
         raise InvalidInputError(f"expected at most {MOST_ROWS} rows, got more.")
     if "t" not in frame:
         raise InvalidInputError(f"expected a column t in [s], got {', '.join(frame.columns[:8])}.")
-    for name in frame.columns:
-        kind, _, joint = name.partition(".")
-        if kind in ("q", "command", "measured") and joint not in arm.joint_names:
+    if frame.empty:
+        raise InvalidInputError("expected rows below the names of columns, got none.")
+    used = [name for name in frame.columns if name == "t" or name.partition(".")[0] in ("q", "command", "measured")]
+    for name in used:
+        joint = name.partition(".")[2]
+        if name != "t" and joint not in arm.joint_names:
             raise UnknownNameError(f"joint of {arm.name} (column {name})", joint, arm.joint_names)
-    for name in frame.columns:
+    for name in used:
         if not pd.api.types.is_numeric_dtype(frame[name]) or not np.isfinite(frame[name]).all():
             row = int(np.argmin(np.isfinite(pd.to_numeric(frame[name], errors="coerce")))) + 2
             raise InvalidInputError(f"line {row}: expected a finite number in column {name}.")
@@ -112,7 +118,7 @@ def _mcap(path: pathlib.Path, arm: Arm) -> tuple[FloatArray, dict[str, FloatArra
                 values = _values(message, arm, "velocity" if commanded else "position")
                 (commands if commanded else states).append((1e-9 * stamp, values))
     except AnyReaderError as error:
-        raise InvalidInputError(f"expected an MCAP file, got a fault: {error}.") from None
+        raise InvalidInputError(f"expected an MCAP file, got a fault: {str(error).strip(' .')}.") from None
     if not states or not commands:
         raise InvalidInputError(
             f"expected joint states and, in a topic with 'command' in its name, commands; got {len(states)} and "
@@ -141,6 +147,9 @@ def _values(message: Any, arm: Arm, field: str) -> list[float]:
 
 def _log(time: FloatArray, columns: dict[str, FloatArray | None], arm: Arm) -> Log:
     q, command, measured = columns["q"], columns["command"], columns["measured"]
+    for kind in ("q", "command"):
+        if not np.isfinite(columns[kind]).all():  # type: ignore[arg-type]  # both are there
+            raise InvalidInputError(f"{kind}: expected finite numbers, got nan or inf.")
     period = _period(time)
     _check_limits(arm, q, command)
     return Log(period, q, command, measured)  # type: ignore[arg-type]  # both are there
@@ -160,6 +169,11 @@ def _period(time: FloatArray) -> float:
     if time[-1] - time[0] < SHORTEST:
         raise InvalidInputError(f"expected at least {SHORTEST:g} s, got {time[-1] - time[0]:.3g} s.")
     median = float(np.median(steps))
+    if median > SLOWEST:
+        hint = "; these look like milliseconds" if median < 1e3 * SLOWEST else ""
+        raise InvalidInputError(
+            f"t: expected a control period of at most {SLOWEST:g} s, got times {median:g} s apart{hint}."
+        )
     off = np.abs(steps - median) > JITTER * median
     if off.mean() > RARE:
         other = float(np.median(steps[off]))

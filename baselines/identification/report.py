@@ -22,8 +22,11 @@ from ikgym.plant.identified import IdentifiedPlant
 from ikgym.scenarios.files import document
 from ikgym.validation import FloatArray
 
-#: Total latency in periods below which commands look like measured velocities, and the error that they leave.
-INSTANT, EXACT = 0.3, 0.01
+#: Commands look like measured velocities where all latencies are below the first of these, in periods, and either below
+#: the second one with such a small error, as a share of the motion, or the motion comes earlier by the last one.
+SOON, INSTANT, EXACT, EARLY = 1.0, 0.3, 0.01, 0.2
+#: Largest error of a motion that a fit explains, as a share of it.
+EXPLAINED = 0.5
 #: Gains that come of degrees instead of radians.
 DEGREES = 180.0 / math.pi
 #: Differences of gentle and excited parts that count: in periods, and of the gain.
@@ -89,7 +92,10 @@ class Identified:
         for j, joint in enumerate(self.joints):
             unit = "m/s" if self.arm.prismatic[j] else "rad/s"
             if not joint.moved:
-                lines.append(f"{joint.name} moved too little to tell: it has the middle of the other joints' numbers")
+                lines.append(
+                    f"{joint.name} moved too little, or not as commanded, to tell: it has the middle of the other "
+                    "joints' numbers"
+                )
                 continue
             if joint.friction:
                 lines.append(f"{joint.name}: friction or a dead band takes about {joint.friction:.2g} {unit}")
@@ -167,6 +173,14 @@ def identify(log: Log, arm: Arm) -> Identified:
     _check_pairs(log, arm)
     joints = [fit_joint(log, j, name, float(arm.velocity_limit[j])) for j, name in enumerate(arm.joint_names)]
     moved = [joint for joint in joints if joint.moved]
+    latency = [joint.lag.delay + joint.lag.time_constant / log.period for joint in moved]
+    if max(latency, default=0.0) < SOON:
+        early = [_precedes(log, arm, joint) for joint in joints]
+        if any(early) and all(one or not joint.moved for one, joint in zip(early, joints, strict=True)):
+            raise InvalidInputError(
+                "command: expected commands, which come before the motion, got columns that come with it or after it: "
+                "these look like measured velocities, or q like a motion that no arm has made."
+            )
     if not moved:
         raise InvalidInputError("expected joints that move as they are commanded, got none that moved enough to tell.")
     gain = float(np.median([joint.lag.gain for joint in moved]))
@@ -175,12 +189,6 @@ def identify(log: Log, arm: Arm) -> Identified:
             raise InvalidInputError(
                 f"{what}: expected [rad] and [rad/s], got gains of {gain:.3g}: degrees and radians."
             )
-    latency = [joint.lag.delay + joint.lag.time_constant / log.period for joint in moved]
-    if max(latency) < INSTANT and (early := [_precedes(log, arm, joint) for joint in moved]) and all(early):
-        raise InvalidInputError(
-            "command: expected commands, which come before the motion, got columns that come with it or after "
-            "it: these look like measured velocities."
-        )
     middle = [float(np.median([getattr(one.lag, key) for one in moved])) for key in ("delay", "time_constant", "gain")]
     guess = Lag(middle[0], middle[1], middle[2])
     return Identified(arm, log, tuple(one if one.moved else dataclasses.replace(one, lag=guess) for one in joints))
@@ -189,10 +197,15 @@ def identify(log: Log, arm: Arm) -> Identified:
 def _precedes(log: Log, arm: Arm, joint: Joint) -> bool:
     """Whether the motion of a joint is its command of the same period, or of a later one."""
     part = Part(log, arm.joint_names.index(joint.name))
-    late, lag = fit_lag(part, lowest=-5), joint.lag
     size = float(np.sqrt(np.square(part.y).mean()))
-    rest = [float(np.sqrt(np.square(simulate_lag(part, one) - part.y).mean())) for one in (late, lag)]
-    return late.delay < -0.2 or rest[1] < EXACT * size
+
+    def explains(lag: Lag, share: float) -> bool:
+        return float(np.sqrt(np.square(simulate_lag(part, lag) - part.y).mean())) < share * size
+
+    late, lag = fit_lag(part, lowest=-5), joint.lag
+    latency, soonest = (one.delay + one.time_constant / log.period for one in (lag, late))
+    at_once = joint.moved and latency < INSTANT and explains(lag, EXACT)
+    return at_once or (soonest < -EARLY and explains(late, EXPLAINED))
 
 
 def _check_pairs(log: Log, arm: Arm) -> None:
@@ -205,6 +218,8 @@ def _check_pairs(log: Log, arm: Arm) -> None:
     alike = (u @ y.T) / np.maximum(power, 1e-300)
     for j, name in enumerate(arm.joint_names):
         other = int(np.argmax(alike[:, j]))
+        if alike[j, j] < -0.8:
+            raise InvalidInputError(f"q.{name}: expected to follow command.{name}, got a motion against it: the sign.")
         if other != j and alike[other, j] > 0.8 and alike[j, j] < 0.5:
             raise InvalidInputError(
                 f"q.{name}: expected to follow command.{name}, got a motion that follows command."

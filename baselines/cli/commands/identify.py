@@ -71,6 +71,8 @@ def _work(options: Options, _: str) -> None:
         if file is not None:
             check_writable_file(file)
     if options.excite is not None:
+        if options.log is not None:
+            raise InvalidInputError(f"--excite: expected no log, got {options.log!r}: one or the other.")
         _excite(options)
         return
     if options.log is None:
