@@ -7,7 +7,7 @@ import os
 from typing import Any, Self
 
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.files import read_user_toml
 from ikgym.frozen import Frozen
 from ikgym.plant.checks import PerJoint, joint_numbers
@@ -66,6 +66,8 @@ class IdentifiedPlant(Frozen):
             known_names("key of [plant]", plant, [field.name for field in dataclasses.fields(Plant)])
             known_names("key of [drives]", drives, ("delay", "time_constant"))
             return cls(table["arm"], table["joints"], table["period"], Plant(**plant), **drives)
+        except UnknownNameError as error:
+            raise UnknownNameError(f"{error.kind} in {file}", error.name, error.available) from None
         except InvalidInputError as error:
             raise InvalidInputError(f"{file}: {error}") from None
 

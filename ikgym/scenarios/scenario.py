@@ -236,8 +236,13 @@ class Scenario(Frozen):
 
         Raises:
             UnknownNameError: There is no field of that name.
-            InvalidInputError: A new value is refused.
+            InvalidInputError: A new value is refused, or Δt changes below drives of low order, which belong to one.
         """
+        if self.plant.drive and "plant" not in changes and changes.get("dt", self.dt) != self.dt:
+            raise InvalidInputError(
+                f"dt: expected {self.dt:g} s, to which the drives of low order of {self.name!r} belong, or another "
+                f"plant with it; got {shortened(changes['dt'])}."
+            )
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)
         arm = changes.get("arm")
