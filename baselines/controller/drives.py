@@ -152,7 +152,9 @@ def policy_for(
         UnknownNameError: There is no such policy, or parameter of it.
     """
     if not isinstance(drives, Drives) and drives != IDENTIFY:
-        raise InvalidInputError(f"drives: expected Drives(…), {IDENTIFY!r} or a file that ends in .toml, got {shortened(drives)}.")
+        raise InvalidInputError(
+            f"drives: expected Drives(…), {IDENTIFY!r} or a file that ends in .toml, got {shortened(drives)}."
+        )
     if isinstance(policy, SolverPolicy):
         _check(policy, scenario)
     perfect = isinstance(drives, Drives) and drives.perfect
