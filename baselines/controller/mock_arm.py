@@ -99,12 +99,18 @@ class ArmInterface:
         q: FloatArray = self._simulator.true_q[0]
         return q
 
-    def cycle(self, command: FloatArray | None) -> State:
+    def cycle(self, command: npt.ArrayLike | None) -> State:
         """One period.
 
         Args:
-            command: The message of this period: joint velocities in [rad/s] or [m/s]; None where there is none.
+            command: The message of this period: joint velocities in [rad/s] or [m/s], of shape (n,); None where there
+                is none.
+
+        Raises:
+            InvalidInputError: The shape is another one.
         """
+        if command is not None:
+            command = numbers("command", command, self._command.shape)
         late = self._jitter * abs(self._rng.standard_normal()) > DEADLINE
         if command is None or late or self._rng.random() < self._lost:
             self._missed += 1
@@ -112,7 +118,7 @@ class ArmInterface:
             limit = self.scenario.arm.velocity_limit
             wanted = np.clip(wanted, -limit, limit)
         else:
-            self._missed, wanted = 0, command
+            self._missed, wanted = 0, command.copy()
         if self._reflex is None:
             self._reflex = self._refused(wanted)
         if self._reflex is not None:  # brakes as hard as it can
@@ -151,7 +157,8 @@ class MockArm:
 
     Args:
         scenario: See :class:`ArmInterface`; likewise ``jitter``, ``lost`` and ``seed``.
-        real_time: Whether it is a process that runs in real time. If not, :meth:`read` makes one period, with the
+        real_time: Whether it is a process that runs in real time: a script that makes one needs the line ``if __name__
+            == "__main__":``, since the new process imports the script. If not, :meth:`read` makes one period, with the
             command that was written since the last one: for many runs in little time, with the same code.
 
     Raises:
@@ -204,7 +211,7 @@ class MockArm:
         """
         command = numbers("qdot", qdot, (self._joints,))
         if self._process is None:
-            self._command = command
+            self._command = command.copy()
             return
         try:
             self._pipe.send(command)
@@ -229,6 +236,8 @@ def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
         pipe.send(state)
         due = time.perf_counter()
         while True:
+            if not begun:  # the pipe is full while nobody reads
+                due = time.perf_counter()
             due += period
             command = None
             while (left := due - time.perf_counter()) > 0.0 or pipe.poll():

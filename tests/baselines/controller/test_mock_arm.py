@@ -55,6 +55,17 @@ def test_reflexes(values, reflex, period):
     assert reflex_of(first_joint(values)) == (reflex, period)
 
 
+def test_an_array_that_is_used_again_hides_no_jump():
+    arm, command = MockArm(SCENARIO, real_time=False), np.zeros(7)
+    for speed in (0.0, 0.5):
+        arm.read()
+        command[:] = speed
+        arm.write(command)
+    assert arm.read().reflex is Reflex.ACCELERATION
+    with pytest.raises(InvalidInputError, match=r"command: expected .*\(7,\)"):
+        ArmInterface(SCENARIO).cycle([0.0])
+
+
 def test_after_a_reflex_the_arm_comes_to_rest_and_stays_there():
     arm = ArmInterface(SCENARIO)
     for value in ramp(0.5 * JERK, 3):
