@@ -23,6 +23,7 @@ from baselines.spec import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
+from ikgym.kernels.limits import CHANGE, FASTEST
 from ikgym.kernels.tasks import pose_rows
 from ikgym.obstacles import Obstacle
 from ikgym.scenarios import Scenario
@@ -95,6 +96,9 @@ class Controller:
         self._given = drives if isinstance(drives, Drives) else None
         problem = self._problem = self.policy.problem
         self._limits = problem.limits
+        # The largest changes of a command that limits allow: larger ones are those of an arm that has stopped itself.
+        steps = problem.limits[JERK]
+        self._quickest = np.minimum(problem.limits[CHANGE], steps + np.sqrt(2.0 * problem.limits[FASTEST] * steps))
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         delay = LONGEST if self._given is None else math.ceil(np.max(self._given.delay))
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
@@ -141,7 +145,8 @@ class Controller:
                 shape (o, 16).
             commanded: The joint velocities in [rad/s] or [m/s] that the arm has taken for the last command, where its
                 interface reports them (libfranka: ``dq_d``): others than were sent where a message was lost. The limits
-                of acceleration and jerk start from them. The last command if left out. Shape (n,).
+                of acceleration and jerk start from them, those of the first command as well. Cut to the largest
+                velocities. The last command if left out. Shape (n,).
 
         Returns:
             Joint velocities in [rad/s] or [m/s], within the limits. Shape (n,).
@@ -150,17 +155,16 @@ class Controller:
             InvalidInputError: Something has a wrong shape, the reference is too short, or obstacles are missing.
         """
         measured = numbers("q", q, (self._joints,))
-        speed = self._last.copy() if qdot is None else self._speed(qdot)
-        if commanded is not None:
-            sent = numbers("commanded", commanded, (self._joints,))
-            if np.isfinite(sent).all():
-                self._moved += sent - self._last
-                self._last[:] = sent
-            else:
-                speed = sent  # which the guards refuse
+        taken = None if commanded is None else self._speed("commanded", commanded)
+        speed = (self._last.copy() if taken is None else taken) if qdot is None else self._speed("qdot", qdot)
         seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)
+        if taken is not None and not np.isfinite(taken).all():
+            speed = taken  # which the guards refuse
+        elif taken is not None:
+            self._moved = np.clip(self._moved + taken - self._last, -self._quickest, self._quickest)
+            self._last[:] = taken
         if self._stopped is None:
             reason = kernels.watch(
                 *(measured, speed, seen, ahead, *ages),
@@ -169,7 +173,7 @@ class Controller:
             if solids is not None and not np.isfinite(solids).all():
                 reason = kernels.NOT_FINITE
             if self._made == 0 and reason != kernels.NOT_FINITE:
-                self._last[:] = speed  # an arm in motion is taken over
+                self._last[:], self._moved[:] = speed if taken is None else taken, 0.0  # an arm in motion is taken over
             if reason == 0:
                 return self._commanded(measured, speed, seen, nominal, ages, solids)
             self._stopped = StopReason(reason)
@@ -220,10 +224,10 @@ class Controller:
             raise InvalidInputError("report: expected a step to be made first.")
         return self.policy.report(self._state)
 
-    def _speed(self, qdot: npt.ArrayLike) -> FloatArray:
-        """Measured joint velocities, cut to the largest ones. Shape (n,)."""
+    def _speed(self, name: str, qdot: npt.ArrayLike) -> FloatArray:
+        """Reported joint velocities, cut to the largest ones. Shape (n,)."""
         fastest = self._problem.largest_qdot
-        speed: FloatArray = np.clip(numbers("qdot", qdot, (self._joints,)), -fastest, fastest)
+        speed: FloatArray = np.clip(numbers(name, qdot, (self._joints,)), -fastest, fastest)
         return speed
 
     def _obstacles(self, obstacles: npt.ArrayLike | Sequence[Obstacle] | None) -> FloatArray | None:

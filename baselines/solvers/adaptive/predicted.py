@@ -184,7 +184,8 @@ class Predicted(NamedWrapper):
         share, problem = np.full(len(batch.q), self.gain), self.problem
         if not kept.begun.all():
             fresh = ~kept.begun
-            kept.arm_q[fresh], kept.arm_qdot[fresh, 0], share[fresh] = batch.q[fresh, None], batch.qdot[fresh], 1.0
+            kept.arm_q[fresh], kept.arm_qdot[fresh, :2] = batch.q[fresh, None], batch.qdot[fresh, None]
+            share[fresh] = 1.0
         q_age, pose_age = _steps(batch.q_age, len(share)), _steps(batch.pose_age, len(share))
         off = np.empty_like(batch.q)
         identify_rows(batch.q, q_age, tuple(self._hypotheses), tuple(kept))

@@ -9,8 +9,10 @@ import pytest
 
 import ikgym
 from baselines import Controller, Drives, Guards
+from baselines.controller import StopReason
 from baselines.controller.drives import half_period
 from docs.loop import DrivenArm, peaks, played
+from ikgym.exceptions import InvalidInputError
 from tests.baselines.controller.circles import circle
 
 LAG = 0.02
@@ -75,6 +77,47 @@ def test_a_stop_keeps_the_limits_of_jerk():
     assert np.abs(commands[299]).max() > 0.1
     assert (commands[-1] == 0.0).all()
     assert max(jerks(np.array(commands), scenario)) <= 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("drives", [Drives(), Drives(2, LAG)])
+@pytest.mark.parametrize("reported", ["qdot", "commanded"])
+def test_an_arm_in_motion_is_taken_over_with_limits_of_jerk(drives, reported):
+    """From an acceleration of 0; and an arm that has stopped itself makes no command run away."""
+    scenario = circle("panda").replace(jerk_limit=None)
+    controller = Controller(scenario, drives=drives, guards=Guards(position_error=1.0, orientation_error=3.0))
+    nominal, q = scenario.nominal(0, controller.ahead), scenario.first_q(scenario.trajectory)
+    speed = np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    commands = [speed, speed]
+    for k in range(60):
+        report = {reported: commands[-1]} if k == 0 or reported == "commanded" else {}
+        commands.append(controller.step(q, None, nominal[: controller.ahead], **report))
+        q = q + scenario.dt * commands[-1]
+    assert controller.stopped is None
+    changes = np.diff(commands, axis=0) / scenario.dt
+    assert (np.abs(changes) <= (1.0 + 1e-6) * scenario.arm.acceleration_limit).all()
+    assert (np.abs(np.diff(changes, axis=0)) <= (1.0 + 1e-6) * scenario.dt * scenario.arm.jerk_limit).all()
+    assert np.abs(commands).max() < 0.31
+    for fast in (1e300, 0.0):
+        for _ in range(40):
+            report = controller.step(q, None, nominal[: controller.ahead], commanded=np.full(7, fast))
+            assert (np.abs(report) <= scenario.arm.velocity_limit + 0.02).all()
+
+
+def test_a_report_that_is_refused_changes_nothing():
+    scenario = circle("panda").replace(jerk_limit=None)
+    loops = [Controller(scenario, drives=Drives()) for _ in range(2)]
+    nominal, q = scenario.nominal(0, loops[0].ahead), scenario.first_q(scenario.trajectory)
+    for loop in loops:
+        loop.step(q, None, nominal[: loop.ahead])
+    with pytest.raises(InvalidInputError, match="reference"):
+        loops[0].step(q, None, nominal[:1, :3], commanded=np.full(7, 0.1))
+    with pytest.raises(InvalidInputError, match=r"commanded: expected shape \(7,\)"):
+        loops[0].step(q, None, nominal[: loops[0].ahead], commanded=[0.1])
+    first, second = (loop.step(q, None, nominal[: loop.ahead]) for loop in loops)
+    np.testing.assert_array_equal(first, second)
+    stop = loops[0].step(q, None, nominal[: loops[0].ahead], commanded=np.full(7, np.nan))
+    assert loops[0].stopped is StopReason.NOT_FINITE
+    assert np.isfinite(stop).all()
 
 
 @pytest.mark.slow
