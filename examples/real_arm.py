@@ -31,7 +31,7 @@ def main(seconds=1.0, period=0.001, real_time=True):
             ahead = reference[k + 1 : k + 1 + controller.ahead]
             arm.write(controller.step(state.q, None, ahead, commanded=state.commanded))
             errors.append(np.linalg.norm(scenario.arm.forward(state.q)[1] - reference[k, -3:]))
-    print(f"{len(errors)} periods; the tool erred by {1e3 * np.max(errors):.3g} mm at most")
+    print(f"{len(errors)} periods; the tool erred by {1e3 * max(errors, default=0.0):.3g} mm at most")
     return errors
 
 

@@ -68,7 +68,7 @@ def stopping_change(velocity, change, most, step):
     """The next change of a velocity on the fastest way to rest, with a bounded jerk.
 
     The velocity reaches 0 together with its change: the last changes shrink by ``step`` each, as the velocities do in
-    :func:`braking_speed`. A velocity that cannot help to pass through 0 comes back.
+    :func:`braking_speed`. A velocity that cannot avoid passing through 0 returns to it.
 
     Args:
         velocity: v of the last step, in [rad/s] or [m/s].
@@ -82,7 +82,7 @@ def stopping_change(velocity, change, most, step):
 
 @inlined
 def reachable_change(change, room, most, step):
-    """The largest next change of a velocity that has so much room to its limit, with a bounded jerk.
+    """The largest next change of a velocity with a given room to its limit, with a bounded jerk.
 
     The changes that follow it can shrink to 0 before the limit. ``change`` is the last one; for the others see
     :func:`stopping_change`.
@@ -92,9 +92,10 @@ def reachable_change(change, room, most, step):
 
 @uncounted
 def stopping_way(velocity, change, most, step):
-    """How far a joint still comes forward on the fastest way to rest: the way divided by Δt; see the arguments there.
+    """How far a joint still moves forward on the fastest way to rest, divided by Δt, in [rad/s] or [m/s].
 
-    The steps of the largest change, of which there are many, are taken at once.
+    For the arguments see :func:`stopping_change`. The steps of the largest change, of which there are many, are taken
+    at once.
     """
     way, farthest, whole = 0.0, 0.0, 0.0
     if most < math.inf:
@@ -145,11 +146,14 @@ def _fastest_forward(room, velocity, change, most, step, limit):
 def calm_gain(limits, gain):
     """The share of an error that is corrected in a step, smaller where an acceleration takes some steps to build up.
 
-    A larger one would let an arm with limits of jerk swing about its reference. ``limits`` have the shape (6, n).
+    A larger one would let an arm with limits of jerk swing about its reference. Without a limit of acceleration, the
+    largest one is that from which a joint reaches its velocity limit. ``limits`` have the shape (6, n).
     """
     for j in range(limits.shape[1]):
-        if limits[JERK, j] < math.inf:
-            gain = min(gain, 1.0 / (1.0 + limits[BRAKING, j] / limits[JERK, j]))
+        step = limits[JERK, j]
+        if step < math.inf:
+            largest = min(limits[BRAKING, j], braking_speed(limits[FASTEST, j], step))
+            gain = min(gain, 1.0 / (1.0 + largest / step))
     return gain
 
 

@@ -60,6 +60,40 @@ def test_the_observed_velocity_counts_where_an_episode_begins(text):
     assert not identical(policy.predict(moving, state)[0], first)
 
 
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("text", ["qp", "qp_path", "sns", "predicted:policy=qp", "smoothed:policy=sns"])
+def test_with_limits_of_jerk_rows_do_not_depend_on_each_other(text, shared, monkeypatch):
+    """Also where one of several episodes begins anew: the changes of commands are remembered row by row."""
+    scenario, rows = SCENARIO.replace(jerk_limit=2000.0), 3
+    name, parameters = baselines.spec.parse_policy(text)
+    policy = baselines.make(name, scenario, **parameters)
+    if shared:
+        monkeypatch.setattr(threads, "count_cores", lambda: 2)
+        for one in (policy, getattr(policy, "inner", policy)):
+            monkeypatch.setattr(type(one), "grain", 1)
+    envs = gym.make_vec("RedundantIK-v0", num_envs=rows, scenario=scenario, preview=policy.preview)
+    seen, state, alone = envs.reset(seed=0)[0], None, [None] * rows
+    for k in range(scenario.steps - 1):
+        starting = np.array([False, k == 4, False])
+        seen = dict(seen, nominal=seen["nominal"] + 0.02)  # far enough away that the limits are met
+        action, state = policy.predict(seen, state, starting)
+        for row in range(rows):
+            shown = {key: values[row] for key, values in seen.items()}
+            single, alone[row] = policy.predict(shown, alone[row], starting[row])
+            assert identical(single, action[row])
+            assert identical([part[0] for part in alone[row]], [part[row] for part in state])
+        seen = envs.step(action)[0]
+    assert np.abs(action).max() > 0.01
+
+
+@pytest.mark.parametrize("name", ["qp", "sns"])
+def test_errors_are_corrected_with_a_limit_of_jerk_alone(name):
+    """As of an arm from a URDF file, which states no acceleration limit."""
+    arm = SCENARIO.arm.replace(acceleration_limit=None)
+    scenario = ikgym.scenarios.get("panda-circle").replace(arm=arm, jerk_limit=5000.0, steps=400)
+    assert baselines.track(scenario, name).position_error[-100:].max() < 1e-5
+
+
 def test_policies_without_acceleration_limits_remember_nothing():
     assert not baselines.make("dls", SCENARIO).remembers_command
     assert not baselines.make("qp", "iiwa14-circle").remembers_command
