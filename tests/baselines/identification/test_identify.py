@@ -201,7 +201,8 @@ def test_the_motion_is_within_its_share_clear_and_at_rest_at_both_ends(name):
         assert arm.clearance(q[::5])[0].min() > 0.0
 
 
-def test_the_command_writes_a_plant_that_scenarios_and_controllers_take(log, tmp_path, capsys):
+def test_the_command_writes_a_plant_that_scenarios_and_controllers_take(log, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")  # so that no name is broken into two lines
     motion, record_file, plant = (str(tmp_path / name) for name in ("excite.csv", "log.csv", "plant.toml"))
     assert main(["identify", "--excite", "panda", "--seconds", "6", "--out", motion]) == 0
     assert read(motion, ARM).period == pytest.approx(PERIOD)
