@@ -249,5 +249,6 @@ def _room(moves: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatAr
         ends = np.sort([(-1.0 - moves) / direction, (1.0 - moves) / direction], axis=0)
     low, high = ends[0].max(axis=1), ends[1].min(axis=1)
     # A joint that moves too far, and not along the direction, leaves no range.
-    low, high = (np.where(np.isfinite(low + high), end, 0.0) for end in (low, high))
+    finite = np.isfinite(low) & np.isfinite(high)
+    low, high = (np.where(finite, end, 0.0) for end in (low, high))
     return 0.5 * (low + high), 0.5 * (high - low)

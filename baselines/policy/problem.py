@@ -66,9 +66,8 @@ class Problem(Frozen):
         change = self.dt * self.model.acceleration_limit
         braking = np.maximum(change - 2.0 * ROUNDING * self.velocity_limit, 0.5 * change)
         jerk = self.dt * self.dt * (np.inf if self.jerk_limit is None else self.jerk_limit)
-        steps = np.where(
-            jerk < 2.0 * change, np.maximum(jerk - 4.0 * ROUNDING * self.velocity_limit, 0.5 * jerk), np.inf
-        )
+        steps = np.maximum(jerk - 4.0 * ROUNDING * self.velocity_limit, 0.5 * jerk)
+        steps = np.where(jerk < (2.0 - 1e-9) * change, steps, np.inf)
         model = self.model
         return read_only(np.array([model.lower, model.upper, self.largest_qdot, change, braking, steps]))
 

@@ -103,7 +103,7 @@ class Unknown:
 @needs_proc
 def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, caplog):
     nodes, other, folder = cluster
-    check, done = playing.check_versions, []
+    check, done = playing._check_versions, []
 
     def kill_half_way(batch, results):
         done.append(batch[0].key)
@@ -116,7 +116,7 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     alone = evaluate(**given)
     monkeypatch.setattr(playing, "BLOCK", 1)
     monkeypatch.setattr(playing, "finished", lambda function, *given: finished(work, *given))
-    monkeypatch.setattr(playing, "check_versions", kill_half_way)
+    monkeypatch.setattr(playing, "_check_versions", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
     assert caplog.text.count("its job is retried") == 1

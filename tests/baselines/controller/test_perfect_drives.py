@@ -133,7 +133,10 @@ def test_what_has_a_wrong_shape_is_refused(arguments, message):
         (lambda: Drives(-1), "delay: expected a number of at least 0 or one a joint, got -1"),
         (lambda: Controller("panda-circle", drives=Drives((1, 2))), "delay: expected "),
         (lambda: Drives(2, -0.02), "time_constant: expected a number of at least 0 or one a joint, got -0.02"),
-        (lambda: Controller("varga7-fast", drives="known"), "drives: expected Drives.…., 'identify' or a file that ends in .toml, got 'known'"),
+        (
+            lambda: Controller("varga7-fast", drives="known"),
+            "drives: expected Drives.…., 'identify' or a file that ends in .toml, got 'known'",
+        ),
         (lambda: Controller("panda-circle", "predicted", Drives(2)), "drives: predicted predicts by itself"),
         (lambda: Guards(age=-1), "age: expected a whole number of at least 0"),
         (lambda: Guards(tolerance=None), "tolerance: expected a finite number above 0, got None"),

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import ikgym
+from baselines.policy import Problem
 from baselines.solvers.quadratic_program.velocity_box import smooth_box, stopping_change, stopping_way, velocity_box
 from ikgym.kernels.jit import kernel
 
@@ -85,3 +87,13 @@ def test_without_a_limit_of_jerk_the_box_is_that_of_velocity_and_acceleration():
     smooth_box(limits_of(np.inf), DT, q, last, np.full(1, np.nan), boxes[0], boxes[1])
     velocity_box(limits_of(np.inf), DT, q, last, boxes[2], boxes[3])
     assert (boxes[:2] == boxes[2:]).all()
+
+
+def test_the_limits_of_the_panda_matter_below_periods_of_4_ms():
+    scenario = ikgym.scenarios.get("panda-circle").replace(jerk_limit=None)
+    assert [Problem.of(scenario.replace(dt=dt)).jerk_limited for dt in (0.001, 0.0039, 0.004, 0.01)] == [
+        True,
+        True,
+        False,
+        False,
+    ]
