@@ -14,7 +14,7 @@ from baselines.controller import MockArm
 from ikgym.plant import Plant
 
 
-def main(seconds=1.0, period=0.001, real_time=True):
+def main(seconds=1.0, period=0.001, real_time=False):
     """Drives a Panda on a circle, with drives that lag by 20 ms, late and lost messages, and noisy encoders."""
     scenario = ikgym.scenarios.get("panda-circle").replace(dt=period, steps=round(seconds / period), jerk_limit=None)
     drives = Plant(bandwidth=8.0, command_delay=2, q_noise=1e-5)

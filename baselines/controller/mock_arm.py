@@ -171,6 +171,7 @@ class MockArm:
         self._command: FloatArray | None = None
         self._pipe: Any = None
         self._process: Any = None
+        self._read_at = 0.0
         if real_time:
             context = multiprocessing.get_context("spawn")
             self._pipe, far = context.Pipe()
@@ -201,6 +202,7 @@ class MockArm:
                 state = self._pipe.recv()
         except (EOFError, OSError):
             raise InvalidInputError("read: expected an arm that is switched on.") from None
+        self._read_at = state.time
         return state
 
     def write(self, qdot: npt.ArrayLike) -> None:
@@ -214,7 +216,7 @@ class MockArm:
             self._command = command.copy()
             return
         try:
-            self._pipe.send(command)
+            self._pipe.send((self._read_at, command))
         except OSError:
             raise InvalidInputError("write: expected an arm that is switched on.") from None
 
@@ -227,7 +229,7 @@ class MockArm:
 
 
 def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
-    """The process of an arm: a period after the other in real time, with the newest command that has come."""
+    """The process of an arm: a period after the other in real time, with the command that answers the last state."""
     arm = ArmInterface(scenario, **options)
     arm.cycle(np.zeros(scenario.joints))  # compiles
     arm, period = ArmInterface(scenario, **options), scenario.dt
@@ -242,7 +244,9 @@ def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
             command = None
             while (left := due - time.perf_counter()) > 0.0 or pipe.poll():
                 if pipe.poll(max(left, 0.0)):
-                    command = pipe.recv()
+                    stamp, message = pipe.recv()
+                    if stamp == arm.state.time or not begun:  # one that was made for an earlier state is late
+                        command = message
             begun = begun or command is not None  # nobody is late before the first command
             pipe.send(arm.cycle(command if begun else np.zeros(scenario.joints)))
     except (EOFError, OSError):
