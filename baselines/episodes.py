@@ -15,7 +15,6 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines.policy.arguments import Report
-from baselines.policy.protocol import Policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation
 from ikgym.kernels.simulation import Outcome
@@ -152,6 +151,35 @@ def add_up(costs: FloatArray) -> FloatArray:
     # NumPy's sum() goes pairwise and differs in the last bits.
     total: FloatArray = np.cumsum(costs, axis=-1)[..., -1]
     return total
+
+
+class Policy(Protocol):
+    """The part of :class:`baselines.SolverPolicy` that the loop of episodes needs."""
+
+    @property
+    def name(self) -> str:
+        """The name in messages."""
+
+    @property
+    def preview(self) -> Preview:
+        """Steps ahead that the policy needs of the reference trajectory, or a tuple of which ones."""
+
+    @property
+    def commands(self) -> int:
+        """Number of past commands that the policy needs."""
+
+    @property
+    def batched(self) -> bool:
+        """Whether `predict` accepts the observations of several arms at once."""
+
+    def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
+        """Actions, and the state for the next call, which is never None."""
+
+    def report(self, state: Any) -> Report:
+        """Status and iterations of the call that returned a state."""
+
+    def diagnostics(self, state: Any) -> dict[str, FloatArray]:
+        """Diagnostics of the call that returned a state, by name."""
 
 
 class Stage(Protocol):

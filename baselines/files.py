@@ -9,6 +9,7 @@ import errno
 import io
 import json
 import logging
+import math
 import os
 import pathlib
 import sys
@@ -68,6 +69,24 @@ def json_text(value: object, indent: int | None = None) -> str:
     if not text.replace("\n", "").isprintable():
         text = "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text)
     return text + "\n"
+
+
+def canonical(value: object) -> str:
+    """Equal JSON texts for equal values."""
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)
+
+
+def jsonable(value: Any) -> Any:
+    """A value as JSON; types that JSON does not have become text."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [jsonable(item) for item in value]
+    if isinstance(value, Mapping):
+        return {str(name): jsonable(item) for name, item in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
 
 
 def csv_text(head: Iterable[str], lines: Iterable[Iterable[object]]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.canonical import canonical, jsonable
+from baselines.files import canonical, jsonable
 from ikgym.arms import Arm, Bodies
 from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant

@@ -1,26 +1,33 @@
 """All policies by name: where the class of each is found, which is imported when it is first asked for.
 
+As text a policy is ``"dls"``, ``"dls:damping=1e-2"``, ``"agent:PATH"`` or ``"package.module:Class:gain=0.5"``.
+
 Packages of others name theirs in the entry-point group :data:`GROUP`.
 """
 
 from __future__ import annotations
 
+import ast
 import functools
 import importlib.metadata
 import inspect
 import re
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 from baselines.policy import SolverPolicy
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
-from ikgym.registry import check_import_path, import_object
+from ikgym.registry import IMPORT_PATH, check_import_path, import_object
 from ikgym.scenarios import Scenario
 from ikgym.validation import known_names
 
 #: The entry points that other packages register policies by: ``name = "module:Class"``.
 GROUP = "ikgym.policies"
+
+#: A policy as text, or its name and its parameters.
+PolicySpec = str | tuple[str, Mapping[str, Any]]
 
 _SOLVERS = "baselines.solvers"
 
@@ -188,3 +195,67 @@ def check_class(kind: object, import_path: str | None = None) -> type[SolverPoli
         missing = ", ".join(sorted(kind.__abstractmethods__))
         raise InvalidInputError(f"Policy {import_path!r}: the class lacks {missing}.")
     return kind
+
+
+def parse_policy(spec: PolicySpec) -> tuple[str, dict[str, Any]]:
+    """Name or import path of a policy, and its parameters.
+
+    Args:
+        spec: ``"name"``, ``"name:parameter=value,parameter=value"`` or a pair of both; ``"agent:PATH"``, too. Instead
+            of a name there may be an import path, ``"package.module:Class"``, which is not imported here. Values are
+            Python's literals; anything else is taken for plain text.
+
+    Raises:
+        UnknownNameError: There is no such policy or parameter.
+        InvalidInputError: The text has another form, or names a parameter twice.
+    """
+    if isinstance(spec, str):
+        name, colon, text = (part.strip() for part in spec.partition(":"))
+        attribute, more, rest = (part.strip() for part in text.partition(":"))
+        if not known(name) and IMPORT_PATH.fullmatch(import_path := f"{name}:{attribute}"):
+            return import_path, parse_parameters(rest, f"policy {spec!r}") if more else {}
+        positional, accepted = get(name).positional, get(name).parameter_names()
+        if positional is not None and text and text.partition("=")[0].strip() not in accepted:
+            parameters: dict[str, Any] = {positional: text}
+        else:
+            parameters = parse_parameters(text, f"policy {spec!r}") if colon else {}
+    elif isinstance(spec, tuple) and len(spec) == 2 and isinstance(spec[0], str) and isinstance(spec[1], Mapping):
+        name, parameters = spec[0].strip(), dict(spec[1])
+        if not known(name) and IMPORT_PATH.fullmatch(name):
+            return name, parameters
+    else:
+        raise InvalidInputError(f"policy: expected 'name:parameter=value' or (name, parameters), got {spec!r}.")
+    known_names(f"parameter of {name}", parameters, get(name).parameter_names())
+    return name, parameters
+
+
+def parse_parameters(text: str, source: str) -> dict[str, Any]:
+    """Names and values of ``"name=value,name=value"``; values are Python's literals, anything else is plain text.
+
+    Raises:
+        InvalidInputError: The text has another form, or names one twice; the message begins with ``source``.
+    """
+    out: dict[str, Any] = {}
+    for part in _split(text):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and value):
+            raise InvalidInputError(f"{source}: expected name=value,…, got {part.strip()!r}.")
+        if name in out:
+            raise InvalidInputError(f"{source}: {name!r} is given twice.")
+        try:
+            out[name] = ast.literal_eval(value)
+        except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+            out[name] = value
+    return out
+
+
+def _split(text: str) -> list[str]:
+    """Parts between commas outside of brackets."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts

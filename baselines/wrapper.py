@@ -14,7 +14,7 @@ import numpy.typing as npt
 from baselines import registry
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy
 from baselines.policy.arguments import pack, read_memory, replace_rows
-from baselines.spec import PolicySpec, parse_policy
+from baselines.registry import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Preview
 from ikgym.validation import FloatArray, known_names

@@ -17,7 +17,7 @@ import numpy as np
 
 import baselines
 from baselines.episodes import Episode, rollout, rollouts
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import EPISODES, FILE
 from ikgym.rl.track import UNIT

@@ -22,7 +22,7 @@ from baselines.episodes import rollouts
 from baselines.identification.excitation import excite
 from baselines.identification.log import Log
 from baselines.identification.report import Identified, identify
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from docs.keeping import Line
 
 POLICIES = ("qp", "qp:gain=0.3", "qp:gain=0.1", "sns", "predicted", "predicted:policy=qp,gain=0.3")

@@ -26,14 +26,14 @@ import tyro
 import ikgym
 from baselines import registry
 from baselines.agents.files import AgentFile, save_agent
-from baselines.canonical import canonical, jsonable
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots.comparison import front
 from baselines.evaluation.rankings import ranking
 from baselines.evaluation.summary import LOWEST
 from baselines.evaluation.table import records
-from baselines.spec import parse_policy
+from baselines.files import canonical, jsonable
+from baselines.registry import parse_policy
 from docs.keeping import PAGES, RESULTS, RUNS, WORK, Line, keep, lines, resumable
 
 #: Agents as they are before their training, and their training seeds.

@@ -15,7 +15,7 @@ import tqdm
 
 import baselines
 import ikgym
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from baselines.status import Status
 from docs.keeping import Line, keep, lines
 

@@ -8,23 +8,22 @@
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
 from ikgym import arms, exceptions, obstacles, problems, scenarios, tasks, trajectories
 from ikgym.arms import Arm
 from ikgym.cost import ProximityCost, TrackingCost
-from ikgym.env import RedundantIKEnv
 from ikgym.exceptions import IkgymError
 from ikgym.kernels import rotations
 from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
-from ikgym.vector_env import RedundantIKVectorEnv
 
 if TYPE_CHECKING:
     from ikgym import rl
+    from ikgym.env import RedundantIKEnv
+    from ikgym.vector_env import RedundantIKVectorEnv
 
 __all__ = [
     "Arm",
@@ -61,10 +60,15 @@ _LEARNING = {
 }
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Imports `ikgym.rl` when it is first used: solvers do not need it."""
+#: Names that are imported when they are first used, since solvers do not need them, and their modules.
+_LATER = {"RedundantIKEnv": "env", "RedundantIKVectorEnv": "vector_env"}
+
+
+def __getattr__(name: str) -> Any:
     if name == "rl":
         return importlib.import_module("ikgym.rl")
+    if name in _LATER:
+        return getattr(importlib.import_module(f"ikgym.{_LATER[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

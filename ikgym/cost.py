@@ -12,8 +12,7 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.kernels import cost as cost_kernels
-from ikgym.kernels.bodies.proximity import ProximityParameters, proximity
-from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.cost import CostParameters, ProximityParameters, proximity
 from ikgym.validation import Bounds, FloatArray, Positive, float_array
 
 #: The exponents of the cost do not exceed it.

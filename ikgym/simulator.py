@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ikgym.arms.limits import limit_rows
 from ikgym.kernels import motions, simulation
-from ikgym.kernels.compilation import announce
+from ikgym.kernels.jit import announce
 from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, outcome, size
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from baselines import registry
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from baselines.tuning.ranges import RANGES, read_ranges
 from docs import keeping, measure
 

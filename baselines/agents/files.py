@@ -16,8 +16,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.agents.network import Network
 from baselines.agents.processing import Processing
 from baselines.agents.track import Track
-from baselines.canonical import canonical
-from baselines.files import ResultsError, read_bytes, reading, write
+from baselines.files import ResultsError, canonical, read_bytes, reading, write
 from baselines.fingerprints import arm_fingerprint, fingerprint
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import cost as cost_kernels

@@ -19,7 +19,7 @@ from baselines.controller.timing import Timing, timing_of
 from baselines.policy import Batch, Memory, Report, SolverPolicy
 from baselines.policy.arguments import read_memory
 from baselines.policy_kernels import JERK
-from baselines.spec import PolicySpec
+from baselines.registry import PolicySpec
 from baselines.status import Status
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError

@@ -13,8 +13,8 @@ import numpy as np
 from baselines import registry
 from baselines.controller.guards import Guards
 from baselines.policy import SolverPolicy
+from baselines.registry import PolicySpec, parse_policy
 from baselines.solvers.adaptive.drives import KNOWN
-from baselines.spec import PolicySpec, parse_policy
 from baselines.wrapper import policies_in
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen

@@ -11,8 +11,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from baselines.canonical import canonical
-from baselines.episodes import Seeds
+from baselines.episodes import Policy, Seeds
 from baselines.evaluation import test_sets
 from baselines.evaluation.metrics import Key, Skipped
 from baselines.evaluation.policies import (
@@ -24,17 +23,18 @@ from baselines.evaluation.policies import (
     specification,
     specifications,
 )
-from baselines.files import ResultsError
+from baselines.files import ResultsError, canonical
 from baselines.fingerprints import fingerprint
 from baselines.oracle.stripped import ideal
-from baselines.policy.protocol import Policy
-from baselines.workers import Workers
 from ikgym import scenarios as scenario_registry
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
-from ikgym.scenarios import Preview, Scenario, imperfect
+from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import offsets
 from ikgym.validation import Bounds
+
+#: The scenario whose plant is at this severity, of the worst one that its map shows.
+FIELD, SEVERITY = "panda-field", 0.5
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -117,7 +117,10 @@ class Options(Frozen):
                 raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
         if self.preview is not None:
             offsets(self.preview)
-        Workers(self.workers, self.cluster)
+        if (self.workers, self.cluster) != (1, None):
+            from baselines.workers import Workers
+
+            Workers(self.workers, self.cluster)  # checks them
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -295,8 +298,8 @@ def _scenarios(options: Options) -> list[Scenario]:
 def at_severities(scenario: Scenario, severities: Sequence[float]) -> list[Scenario]:
     """A scenario with its plant at all pairs of severities: of calibration, payload and camera; of lag and delay."""
     # The plant of panda-field in the catalogue is at a severity in between.
-    field = (scenario.name, scenario.plant) == (imperfect.FIELD_NAME, imperfect.field().plant)
-    plant = imperfect.FIELD if field else scenario.plant
+    field = scenario.name == FIELD and scenario.plant == scenario_registry.get(FIELD).plant
+    plant = scenario.plant.scaled(1.0 / SEVERITY) if field else scenario.plant
     return [
         scenario.replace(name=f"{scenario.name} {knowledge:g} {drives:g}", plant=plant.scaled(knowledge, drives))
         for knowledge, drives in itertools.product(sorted({*severities}), repeat=2)

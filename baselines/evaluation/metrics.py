@@ -15,8 +15,8 @@ import numba
 import numpy as np
 
 import ikgym
-from baselines.canonical import canonical
 from baselines.episodes import Episode, Seeds, add_up
+from baselines.files import canonical
 from baselines.status import Status
 from ikgym.arms import Arm
 from ikgym.arms.limits import BOUNDS, at_limits

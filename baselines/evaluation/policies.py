@@ -10,12 +10,11 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast
 
 from baselines import registry
-from baselines.canonical import jsonable
-from baselines.episodes import Seeds
+from baselines.episodes import Policy, Seeds
+from baselines.files import jsonable
 from baselines.fingerprints import same
 from baselines.policy import Problem, SolverPolicy
-from baselines.policy.protocol import Policy
-from baselines.spec import PolicySpec, parse_policy
+from baselines.registry import PolicySpec, parse_policy
 from ikgym.exceptions import InvalidInputError, MissingDependencyError
 from ikgym.registry import import_object
 from ikgym.scenarios import Preview, Scenario

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.canonical import canonical
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
@@ -22,6 +21,7 @@ from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.motion.free_timing import as_long
 from baselines.files import (
     ResultsError,
+    canonical,
     check_flags,
     check_same,
     check_writable,

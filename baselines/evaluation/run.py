@@ -15,19 +15,17 @@ from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
 import ikgym
-from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, Tick, rollouts
 from baselines.evaluation.jobs import Job, Options, plan
 from baselines.evaluation.metrics import Row, Rows, Skipped, describe, measure
 from baselines.evaluation.policies import ALL, AnyPolicy, check_picklable
-from baselines.files import locked
+from baselines.files import canonical, jsonable, locked
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.oracle.stripped import ideal
 from baselines.policy import SolverPolicy
-from baselines.workers import WorkerError, Workers, finished
 from ikgym.exceptions import printable
-from ikgym.kernels.compilation import logger
+from ikgym.kernels.jit import logger
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import furthest
 
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from baselines.evaluation.results import Results
+    from baselines.workers import Workers
 
 #: Most episodes that are played together: their records are in memory until all of them are finished.
 MOST = 64
@@ -101,8 +100,12 @@ def carry_out(
 ) -> Rows:
     """See :func:`evaluate`. The files state the command; `show` is called with the lines of the table and `skipped`."""
     jobs, skipped = plan(options)
-    workers, results = Workers(options.workers, options.cluster), None
-    workers.check()
+    workers, results = None, None
+    if (options.workers, options.cluster) != (1, None):
+        from baselines.workers import Workers
+
+        workers = Workers(options.workers, options.cluster)
+        workers.check()
     with contextlib.nullcontext() if options.out is None else locked(options.out):
         if options.out is not None:
             from baselines.evaluation.results import Results
@@ -182,40 +185,48 @@ def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     return out
 
 
-def _play_all(jobs: Sequence[Job], workers: Workers, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
-    """Plays all jobs, by workers where there are several, and yields each batch as soon as it is finished.
+def _play_all(jobs: Sequence[Job], workers: Workers | None, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
+    """Plays all jobs, by workers where there are some, and yields each batch as soon as it is finished.
 
     On a cluster nothing is timed: timed jobs are played here, after the others.
     """
-    if workers.cluster is not None:
+    away, here = list[Batch](), batches(jobs)
+    if workers is not None and workers.cluster is not None:
         away = batches((job for job in jobs if not job.timed), BLOCK)
         here = batches(job for job in jobs if job.timed)
-    else:
-        away, here = [], batches(jobs)
-        if workers.number > 1 and len(here) > 1:
-            away, here = here, away
-    if away:
-        check_picklable({batch[0].specification: None for batch in away})
-        with contextlib.closing(finished(play, away, workers)) as all_done:
-            for batch, future in all_done:
-                bar.announce(batch)
-                bar.update(sum(job.scenario.steps for job in batch))
-                try:
-                    played = future.result()
-                except WorkerError as e:
-                    raise WorkerError(
-                        f"{batch[0].policy} in {batch[0].scenario.name}: {e} If memory is short, try fewer --workers. "
-                        "Finished episodes are kept; continue with --resume."
-                    ) from None
-                _check_versions(batch, played)
-                yield batch, played
+    elif workers is not None and len(here) > 1:
+        away, here = here, away
+    if workers is not None and away:
+        yield from _play_away(away, workers, bar)
     for batch in here:
         bar.announce(batch)
         yield batch, play(batch, bar.update)
 
 
+def _play_away(away: Sequence[Batch], workers: Workers, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
+    """Plays batches by workers."""
+    from baselines.workers import WorkerError, finished
+
+    check_picklable({batch[0].specification: None for batch in away})
+    with contextlib.closing(finished(play, away, workers)) as all_done:
+        for batch, future in all_done:
+            bar.announce(batch)
+            bar.update(sum(job.scenario.steps for job in batch))
+            try:
+                played = future.result()
+            except WorkerError as e:
+                raise WorkerError(
+                    f"{batch[0].policy} in {batch[0].scenario.name}: {e} If memory is short, try fewer --workers. "
+                    "Finished episodes are kept; continue with --resume."
+                ) from None
+            _check_versions(batch, played)
+            yield batch, played
+
+
 def _check_versions(batch: Batch, played: Played) -> None:
     """Refuses results of a worker with another version of the code, such as a node of a cluster may have."""
+    from baselines.workers import WorkerError
+
     expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
     if [(row.key, row.fingerprint, row.machine.get("ikgym")) for row, _ in played] != expected:
         raise WorkerError(

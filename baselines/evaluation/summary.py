@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 
 from baselines import registry
-from baselines.canonical import canonical, jsonable
 from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, Row, Rows
 from baselines.evaluation.table import NOTHING, Column, count, interval, number
+from baselines.files import canonical, jsonable
 from baselines.oracle import best_known
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from baselines.statistics import geometric_interval, geometric_mean
 from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError, printable

@@ -14,8 +14,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from baselines.canonical import canonical
-from baselines.files import ResultsError, from_json, read_arrays, reading, write
+from baselines.files import ResultsError, canonical, from_json, read_arrays, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.search import VERSION, polish, search

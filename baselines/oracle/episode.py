@@ -10,7 +10,7 @@ from gymnasium.utils import seeding
 
 from baselines.episodes import Simulation, add_up, rollouts
 from baselines.policy import Problem, SolverPolicy
-from baselines.policy.surroundings import sweep_bodies
+from baselines.policy.problem import sweep_bodies
 from baselines.policy_kernels import Model
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance
 from baselines.solvers.receding_horizon.newton.grid import Grid

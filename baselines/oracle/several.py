@@ -16,7 +16,7 @@ from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
 from baselines.oracle.stripped import stripped
 from baselines.policy import SolverPolicy
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
 from ikgym.scenarios import Scenario
 

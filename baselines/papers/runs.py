@@ -7,8 +7,8 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from baselines.canonical import canonical, jsonable
 from baselines.episodes import Episode, rollout
+from baselines.files import canonical, jsonable
 from baselines.fingerprints import episode_hash
 from baselines.registry import make
 from ikgym import scenarios

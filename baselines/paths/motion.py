@@ -11,9 +11,9 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from baselines import registry
+from baselines.registry import parse_policy
 from baselines.solvers.quadratic_program.qp import QuadraticProgram
 from baselines.solvers.resolved_rate.base import SLOW, velocity_weights
-from baselines.spec import parse_policy
 from ikgym.cost import TrackingCost
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import observation

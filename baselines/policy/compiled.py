@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import abc
+import collections
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -11,16 +13,24 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy.arguments import Parts, not_finite
-from baselines.policy.fields import kernel_fields, named_tuple
+from baselines.policy.problem import surroundings_of
 from baselines.policy.solver import SolverPolicy, compiled_classes
-from baselines.policy.surroundings import surroundings_of
 from baselines.policy_kernels import REFUSED, Batch, Memory, NoMemory, Solution, compile_step
 from ikgym.exceptions import InvalidInputError
+from ikgym.frozen import hints_of
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.validation import FloatArray
 
 #: The place of the obstacles in a :class:`Batch`.
 OBSTACLES = Batch._fields.index("obstacles")
+
+_DERIVED = "derived"
+_PREFIX = "Fields__"
+
+
+def derived() -> Any:
+    """A field that ``__post_init__`` calculates from the parameters for the kernel: a number, an array or a tuple."""
+    return dataclasses.field(init=False, repr=False, metadata={_DERIVED: True})
 
 
 class CompiledPolicy(SolverPolicy, abc.ABC):
@@ -51,7 +61,7 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
     def numbers(self) -> Any:
         """The policy's fields as the kernel takes them, a named tuple: those with a number, and derived ones.
 
-        See :func:`baselines.policy.fields.derived`. Tuples among them are plain.
+        See :func:`derived`. Tuples among them are plain.
         """
         names, among = self.kernel_fields(), self.among_bodies
         values = [getattr(self, name) for name in names] + [*(surroundings_of(self.problem) if among else ())]
@@ -147,3 +157,30 @@ class CompiledPolicy(SolverPolicy, abc.ABC):
 
 #: One compiled call for each kernel and the types of its arguments.
 _compile = functools.cache(compile_step)
+
+
+@functools.cache
+def kernel_fields(policy: Any) -> tuple[str, ...]:
+    """Names of the fields that a kernel takes: parameters of the type float, int or bool, and derived fields."""
+    hints = hints_of(policy)
+    numbers = {name for name, hint in hints.items() if getattr(hint, "__origin__", hint) in {float, int, bool}}
+    fields = dataclasses.fields(policy)
+    return tuple(f.name for f in fields if _DERIVED in f.metadata or (f.init and not f.kw_only and f.name in numbers))
+
+
+@functools.cache
+def named_tuple(names: tuple[str, ...]) -> type[Any]:
+    """The named tuple with fields of these names.
+
+    Its name consists of them, so that machine code on disk, which refers to it by name, belongs to these fields in this
+    order, and every process finds it without the policies that use it.
+    """
+    name = _PREFIX + "__".join(names)
+    kind: type[Any] = globals().setdefault(name, collections.namedtuple(name, names, module=__name__))
+    return kind
+
+
+def __getattr__(name: str) -> Any:
+    if not name.startswith(_PREFIX):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return named_tuple(tuple(filter(None, name.removeprefix(_PREFIX).split("__"))))

@@ -12,11 +12,12 @@ from baselines.policy_kernels import JERK, Model, model_block, model_of
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
 from ikgym.frozen import Frozen
-from ikgym.kernels.bodies import Surroundings
+from ikgym.kernels.bodies import Shapes, Surroundings
 from ikgym.kernels.tasks import pose_rows
+from ikgym.plant.sweep import sweep
 from ikgym.scenarios import Scenario
 from ikgym.tasks import Task
-from ikgym.validation import FloatArray, frozen_array, read_only
+from ikgym.validation import LARGEST, BoolArray, FloatArray, frozen_array, read_only
 
 # Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
 ROUNDING = 2.0**-24
@@ -102,3 +103,25 @@ class Problem(Frozen):
             return cls(*usual, jerk_limit=scenario.jerk_limit)
         model = scenario.model.replace(bodies=scenario.arm.bodies)
         return cls(model, *usual[1:], scenario.surroundings, scenario.obstacles_shown, scenario.jerk_limit)
+
+
+def surroundings_of(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """The bodies of a problem, see :func:`bodies_block`, and the obstacles at the start of an episode.
+
+    There are none where touching does not matter. Shapes (any,), (1, o, 16).
+    """
+    bodies, known = problem.model.bodies, problem.surroundings
+    boxes, checked = bodies.surroundings(()) if known is None else known
+    return bodies_block(bodies.shapes, checked), boxes[None].copy()
+
+
+def bodies_block(shapes: Shapes, checked: BoolArray) -> FloatArray:
+    """Bodies, and which may not touch which obstacle, (o, k), in one block: an array costs a call 0.15 µs."""
+    counts = [len(shapes.links), len(shapes.pairs), len(checked)]
+    return np.concatenate([counts, *map(np.ravel, shapes), checked.ravel()]).astype(np.float64)
+
+
+def sweep_bodies(arm: Arm) -> FloatArray:
+    """How far each joint of an arm moves each body at most within the limits, in [m] per unit. Shape (k, n)."""
+    travel = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
+    return sweep(arm, np.where(arm.prismatic, np.minimum(travel, LARGEST), 0.0), 0.0)

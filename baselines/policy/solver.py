@@ -6,6 +6,7 @@ import abc
 import contextlib
 import dataclasses
 import functools
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar, Self
 
@@ -29,17 +30,21 @@ from baselines.policy.arguments import (
     take_rows,
 )
 from baselines.policy.problem import Problem
-from baselines.policy.sharing import divide_rows, fits_one_call
 from baselines.policy_kernels import Batch, Memory, Solution, all_finite, begin_rows, cut_rows, sent_rows
 from ikgym.frozen import Frozen
-from ikgym.kernels.compilation import announce
+from ikgym.kernels.jit import announce
 from ikgym.kernels.outcome import OBSERVED
+from ikgym.kernels.threads import in_chunks
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Observation
 from ikgym.validation import FloatArray
 
 #: Policies that have solved something in this process, and calls of kernels that have been made: they are compiled.
 compiled_classes: set[Any] = set()
+
+#: Which threads work on a share of a batch. Calls within them are not shared out further: threads of one pool that
+#: wait for others of it wait forever.
+_sharing = threading.local()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -297,7 +302,7 @@ class SolverPolicy(Frozen, abc.ABC):
         return self.memory(1)
 
     def _fits_one_call(self, rows: int) -> bool:
-        return fits_one_call(rows, self.grain)
+        return rows < 2 * self.grain or getattr(_sharing, "now", False)
 
     @classmethod
     @contextlib.contextmanager
@@ -325,4 +330,21 @@ class SolverPolicy(Frozen, abc.ABC):
         def share(part: slice) -> Solution:
             return self.solve(take_rows(batch, part), self._with_names(tuple(array[part] for array in memory)))
 
-        return divide_rows(share, rows, self.grain)
+        return _divide_rows(share, rows, self.grain)
+
+
+def _divide_rows(solve: Callable[[slice], Solution], rows: int, grain: int) -> Solution:
+    """The solution of all rows, each thread solving a part of at least ``grain`` rows."""
+    parts: dict[int, Solution] = {}
+
+    def work(start: int, stop: int) -> None:
+        _sharing.now = True
+        try:
+            parts[start] = solve(slice(start, stop))
+        finally:
+            _sharing.now = False
+
+    in_chunks(work, rows, grain)
+    qdots, memories, status, iterations = zip(*(parts[start] for start in sorted(parts)), strict=True)
+    memory = tuple(np.concatenate(arrays) for arrays in zip(*memories, strict=True))
+    return Solution(np.concatenate(qdots), memory, np.concatenate(status), np.concatenate(iterations))

@@ -20,7 +20,7 @@ LEVER = 0.1
 
 @kernel
 def bodies_of(block):
-    """The :class:`Shapes` in a block of `baselines.policy.surroundings`, and the pairs that are checked."""
+    """The :class:`Shapes` in a block of `baselines.policy.problem`, and the pairs that are checked."""
     k, pairs, obstacles = int(block[0]), int(block[1]), int(block[2])
     starts, ends, radii, sizes, two = 3 + k, 3 + 4 * k, 3 + 7 * k, 3 + 8 * k, 3 + 9 * k
     shapes = Shapes(

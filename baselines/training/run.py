@@ -36,13 +36,12 @@ from tqdm import tqdm
 import ikgym
 from baselines.agents.files import AgentFile, save_agent
 from baselines.agents.policy import Agent
-from baselines.episodes import add_up, rollouts
+from baselines.episodes import Policy, add_up, rollouts
 from baselines.evaluation.metrics import describe, lost
 from baselines.files import check_flags, locked, read_bytes, reading, reason, resumed, write, write_json
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.policy import Problem
-from baselines.policy.protocol import Policy
 from baselines.statistics import geometric_mean
 from baselines.training.apg import Trainer
 from baselines.training.options import APG, TrainingError

@@ -21,14 +21,16 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 from optuna.trial import Trial
 
 from baselines import registry
-from baselines.canonical import DIGITS, round_digits
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.validation import known_names
 
 #: The ranges that come with the solvers.
 RANGES = pathlib.Path(__file__).parents[1] / "data" / "ranges.toml"
+
+#: Significant digits of costs and parameters that are kept.
+DIGITS = 7
 
 #: How a parameter is varied: low, high, log, choices, when.
 Range = Mapping[str, Any]
@@ -95,7 +97,7 @@ def suggest(trial: Trial, ranges: Mapping[str, Range], given: Mapping[str, Any])
         elif isinstance(kind, IntDistribution):
             value = trial.suggest_int(name, kind.low, kind.high, log=kind.log)
         else:
-            value = round_digits(trial.suggest_float(name, kind.low, kind.high, log=kind.log), DIGITS)
+            value = round_digits(trial.suggest_float(name, kind.low, kind.high, log=kind.log))
         out |= nest(name, value, {**given, **out})
     return out
 
@@ -104,3 +106,8 @@ def nest(name: str, value: object, given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameter that a name with a dot belongs to, with one key changed and the other given ones kept."""
     outer, _, inner = name.partition(".")
     return {outer: {**given.get(outer, {}), inner: value} if inner else value}
+
+
+def round_digits(value: float) -> float:
+    """A number with :data:`DIGITS` significant digits."""
+    return float(f"{value:.{DIGITS}g}")

@@ -17,12 +17,11 @@ from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.trial import Trial, TrialState
 
 from baselines import registry
-from baselines.canonical import DIGITS, canonical, round_digits
 from baselines.episodes import add_up, rollouts
-from baselines.files import check_flags, check_same, read_bytes, reading
+from baselines.files import canonical, check_flags, check_same, read_bytes, reading
 from baselines.fingerprints import fingerprint
-from baselines.spec import parse_policy
-from baselines.tuning.ranges import RANGES, Range, nest, ranges_of, read_ranges, suggest
+from baselines.registry import parse_policy
+from baselines.tuning.ranges import RANGES, Range, nest, ranges_of, read_ranges, round_digits, suggest
 from baselines.workers import Workers, finished
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
@@ -211,7 +210,7 @@ def _best(study: optuna.Study, search: Search) -> dict[str, Any]:
         (one.value, one.user_attrs["settings"]) for one in trials if one.state is TrialState.COMPLETE and one.value
     ]
     cost, settings = min([(default, {}), *complete], key=operator.itemgetter(0))
-    digits = {"default": round_digits(default, DIGITS), "tuned": round_digits(cost, DIGITS)}
+    digits = {"default": round_digits(default), "tuned": round_digits(cost)}
     return {"spec": search.spec, "settings": settings, "tried": len(trials) + 1, **digits}
 
 

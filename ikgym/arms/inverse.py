@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.compilation import announce
 from ikgym.kernels.inverse_kinematics import Ranges, Settings, inverse_rows
+from ikgym.kernels.jit import announce
 from ikgym.kernels.kinematics import Chain, add_arm_axis, forward_rows
 from ikgym.kernels.threads import in_chunks
 from ikgym.validation import BoolArray, FloatArray, ending, number, rotation_matrices, whole_number

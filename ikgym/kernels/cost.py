@@ -112,3 +112,22 @@ def velocity_curvature(cost, qdot, out):
     """The diagonal of ∂²Φ^U/∂q̇². Shapes (n,)."""
     for j in range(qdot.shape[0]):
         out[j] = curvature(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+
+
+class ProximityParameters(NamedTuple):
+    """The shape of the cost; see :class:`ikgym.ProximityCost`."""
+
+    clearance: float
+    delta: float
+    p_out: float
+    p_in: float
+
+
+#: No cost at any distance.
+NO_PROXIMITY = ProximityParameters(0.0, 1.0, 1.0, 1.0)
+
+
+@inlined
+def proximity(cost, distance):
+    """Φ^C of the smallest signed distance in [m]; bodies that overlap count as bodies that touch."""
+    return value(max(cost.clearance - max(distance, 0.0), 0.0), cost.delta, cost.p_in, cost.p_out)

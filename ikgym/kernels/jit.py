@@ -11,6 +11,7 @@ machine code by name. The name is the same in all processes, and whoever loads t
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import gc
 import hashlib
@@ -20,7 +21,8 @@ import itertools
 import logging
 import pickle
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -325,3 +327,31 @@ def _has_kernels(module: ModuleType) -> bool:
 def _source(module: str) -> bytes:
     file = getattr(sys.modules.get(module), "__file__", None)
     return Path(file).read_bytes() if file else b""
+
+
+@contextlib.contextmanager
+def announce(what: str, patience: float = 2.0) -> Iterator[None]:
+    """Warns if the block takes long, as when kernels are compiled.
+
+    Args:
+        what: Name of the compiled part.
+        patience: Time after which the warning is logged, in [s].
+    """
+    timer = threading.Timer(patience, _warn, [what])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _warn(what: str) -> None:
+    if kept_on_disk():
+        logger.warning("Compiling %s; this happens once, the machine code is kept on disk.", what)
+    else:
+        logger.warning(
+            "Compiling %s; this happens once in each process, since there is no folder to keep machine code in. "
+            "NUMBA_CACHE_DIR can name one.",
+            what,
+        )

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from ikgym.kernels.bodies import Floats, Integers, Shapes, place, smallest
-from ikgym.kernels.bodies.proximity import ProximityParameters
+from ikgym.kernels.cost import ProximityParameters
 from ikgym.kernels.jit import inlined, kernel, uncounted
 from ikgym.kernels.random_numbers import stream
 from ikgym.kernels.simulation import Flags

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.bodies.proximity import proximity
-from ikgym.kernels.cost import CostParameters
+from ikgym.kernels.cost import CostParameters, proximity
 from ikgym.kernels.jit import expanded, inlined, kernel, uncounted
 from ikgym.kernels.kinematics import Chain, forward
 from ikgym.kernels.limits import FASTEST, LOWER, SLACK, UPPER, clip, limit_command, stop_at_limit

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.bodies import OBSTACLE, PLACED
-from ikgym.kernels.bodies.proximity import OFF
+from ikgym.kernels.cost import NO_PROXIMITY
 from ikgym.kernels.outcome import Outcome
 from ikgym.kernels.random_numbers import CUT
 from ikgym.plant.contact import Contacts
@@ -43,7 +43,7 @@ def contacts_of(scenario: Scenario, rows: int) -> Contacts:
         boxes=boxes,
         drift=drift(boxes[0], arm.reach(travel)),
         shown=obstacles if scenario.obstacles_shown else 0,
-        proximity=OFF if scenario.proximity is None else scenario.proximity.parameters,
+        proximity=NO_PROXIMITY if scenario.proximity is None else scenario.proximity.parameters,
         starts=np.tile(shapes.starts, (rows, 2, 1, 1)),
         ends=np.tile(shapes.ends, (rows, 2, 1, 1)),
         distance=np.full(rows, np.inf),

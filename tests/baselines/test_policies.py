@@ -349,7 +349,7 @@ def test_long_compilation_of_a_policy_is_announced(monkeypatch, caplog):
     shown = good()  # may compile the simulation
     caplog.clear()
     monkeypatch.setattr("baselines.policy.solver.compiled_classes", set())
-    monkeypatch.setattr(ikgym.kernels.compilation.announce.__wrapped__, "__defaults__", (0.01,))
+    monkeypatch.setattr(ikgym.kernels.jit.announce.__wrapped__, "__defaults__", (0.01,))
 
     class Slow(Broken):
         name = "slow"

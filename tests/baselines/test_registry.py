@@ -13,8 +13,8 @@ import baselines
 from baselines import registry
 from baselines.evaluate import evaluate
 from baselines.policy import Solution, SolverPolicy, statuses
+from baselines.registry import parse_policy
 from baselines.solvers.resolved_rate.dls import DampedLeastSquares
-from baselines.spec import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.evaluation.planning import planned
 

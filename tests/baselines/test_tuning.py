@@ -16,7 +16,7 @@ import optuna
 from baselines import registry, tuning
 from baselines.cli.commands.tune import main
 from baselines.files import ResultsError
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from baselines.tuning import Search
 from baselines.tuning.ranges import RANGES, ranges_of, read_ranges, suggest
 from baselines.tuning.search import DONE, JOURNAL, _study

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import baselines
-from ikgym.kernels import compilation, jit
+from ikgym.kernels import jit
 from ikgym.kernels.jit import inner, kernel, uncounted
 
 CALLEE = (
@@ -143,7 +143,7 @@ def test_without_a_folder_to_write_to(no_folder, caplog):
     assert double(4) == 8
     assert "compiled anew in each process" in caplog.text
     assert not jit.kept_on_disk()
-    with compilation.announce("the test", patience=0.01):
+    with jit.announce("the test", patience=0.01):
         threading.Event().wait(0.2)
     assert "Compiling the test; this happens once in each process, since there is no folder" in caplog.text
     assert "kept on disk" not in caplog.text
@@ -242,9 +242,9 @@ def test_machine_code_that_cannot_be_read_is_made_anew(tmp_path, monkeypatch, su
 
 
 def test_long_compilation_is_announced(caplog):
-    with compilation.announce("nothing much", patience=10.0):
+    with jit.announce("nothing much", patience=10.0):
         pass
     assert caplog.text == ""
-    with compilation.announce("nothing much", patience=0.01):
+    with jit.announce("nothing much", patience=0.01):
         threading.Event().wait(0.2)
     assert "Compiling nothing much; this happens once, the machine code is kept on disk." in caplog.text

@@ -3,22 +3,23 @@
 import math
 
 from ikgym import Plant, scenarios
-from ikgym.scenarios import imperfect
+
+FIELD = scenarios.get("panda-field").plant.scaled(2.0)
 
 
 def test_0_is_ideal_and_1_the_plant_itself():
-    assert imperfect.FIELD.scaled(0.0) == Plant()
-    assert imperfect.FIELD.scaled(1.0) == imperfect.FIELD
-    assert imperfect.FIELD.scaled(0.0, 1.0) == scenarios.get("panda-bus").plant
+    assert FIELD.scaled(0.0) == Plant()
+    assert FIELD.scaled(1.0) == FIELD
+    assert FIELD.scaled(0.0, 1.0) == scenarios.get("panda-bus").plant
 
 
 def test_what_grows_in_proportion_and_what_in_whole_steps():
-    half = imperfect.FIELD.scaled(0.5, 0.25)
+    half = FIELD.scaled(0.5, 0.25)
     assert (half.zero, half.link, half.axis, half.payload) == (5e-4, 3e-4, 5e-4, 5e-4)
     assert (half.pose_noise, half.pose_missing, half.pose_every) == (5e-4, 0.1, 17)
     assert half.bandwidth == (40.0, 80.0)  # a quarter of the time constant
     assert half.command_delay == (0, 3)
-    assert half.payload_step == imperfect.FIELD.payload_step
+    assert half.payload_step == FIELD.payload_step
 
 
 def test_single_numbers_and_one_a_joint():

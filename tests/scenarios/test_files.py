@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import ikgym
 from baselines.fingerprints import fingerprint
 from ikgym import scenarios
-from ikgym.arms import Arm, catalogue, from_urdf
+from ikgym.arms import Arm, from_urdf, read_catalogue
 from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
@@ -367,7 +367,7 @@ def test_a_scenario_is_added_by_one_file_and_an_arm_by_one_table(tmp_path):
     assert all(load(file).name == file.stem for known in scenarios.FILES.values() for file in known)
     added = tmp_path / "arms.toml"
     added.write_text("[one]\naxes = 'z'\noffsets = [[0, 0, 1]]\n[long]\nlike = 'one'\ntool = [2, 0, 0]")
-    one, long = (make() for make in catalogue.read(added).values())
+    one, long = (make() for make in read_catalogue(added).values())
     np.testing.assert_array_equal(long.forward([0.0])[1] - one.forward([0.0])[1], [2, 0, 0])
     assert (long.name, long.joints) == ("long", 1)
 

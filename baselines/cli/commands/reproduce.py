@@ -15,12 +15,11 @@ from typing import Annotated
 
 import tyro
 
-from baselines.canonical import jsonable
 from baselines.cli import shell
 from baselines.evaluation.metrics import describe
 from baselines.evaluation.plots.style import png
 from baselines.evaluation.table import to_csv
-from baselines.files import locked, write, write_json
+from baselines.files import jsonable, locked, write, write_json
 from baselines.papers import PAPERS, get, ledger
 from baselines.papers.paper import Finding, Paper
 from baselines.papers.runs import Runs

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.episodes import Episode, Seeds, Tick, rollouts
-from baselines.policy.protocol import Policy
+from baselines.episodes import Episode, Policy, Seeds, Tick, rollouts
 from ikgym.kernels.simulation import nominal_rows
 from ikgym.kernels.tasks import AXIS, POSE
 from ikgym.scenarios import Preview, Scenario

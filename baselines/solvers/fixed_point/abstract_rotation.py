@@ -11,8 +11,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from baselines.policy import Memory, Problem
-from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.fields import derived
+from baselines.policy.compiled import CompiledPolicy, derived
 from baselines.solvers.arm_size import jacobian_bound
 from baselines.solvers.fixed_point.rotations import adaptive_deform, plane, turn
 from baselines.status import Status

@@ -10,8 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from baselines.policy import Memory
-from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.fields import derived
+from baselines.policy.compiled import CompiledPolicy, derived
 from baselines.solvers.arm_size import error_weights, jacobian_bound, length, radian
 from baselines.solvers.fixed_point.iteration import (
     TRANSFORMATIONS,

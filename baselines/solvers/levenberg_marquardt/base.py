@@ -9,8 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from baselines.policy import Memory
-from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.fields import derived
+from baselines.policy.compiled import CompiledPolicy, derived
 from baselines.solvers.levenberg_marquardt.damping import (
     RULES,
     DampingLaw,

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.fields import derived
+from baselines.policy.compiled import derived
 from baselines.solvers.resolved_rate.base import ResolvedRate
 from ikgym.arms.limits import middle
 from ikgym.validation import Bounds, FloatArray, as_given, per_joint, read_only

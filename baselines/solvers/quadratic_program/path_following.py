@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from baselines.policy import Memory
-from baselines.policy.fields import derived
+from baselines.policy.compiled import derived
 from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
 from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.fields import derived
+from baselines.policy.compiled import derived
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import calm_gain, smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion

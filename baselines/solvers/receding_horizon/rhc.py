@@ -18,9 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy import Memory
-from baselines.policy.compiled import CompiledPolicy
-from baselines.policy.fields import derived
-from baselines.policy.surroundings import sweep_bodies
+from baselines.policy.compiled import CompiledPolicy, derived
+from baselines.policy.problem import sweep_bodies
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings

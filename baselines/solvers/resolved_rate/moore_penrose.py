@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.fields import derived
+from baselines.policy.compiled import derived
 from baselines.solvers.resolved_rate.base import (
     ResolvedRate,
     add_feedback,

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from baselines.policy.fields import derived
+from baselines.policy.compiled import derived
 from baselines.solvers.near_bodies import ROWS, bodies_of, near_distances, near_work, repel
 from baselines.solvers.resolved_rate.base import APPLIED, add_feedback, full_rank, set_status, task_motion, to_velocity
 from baselines.solvers.resolved_rate.dls import damped_rows

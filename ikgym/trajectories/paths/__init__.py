@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ikgym.trajectories.paths.line import Line
 from ikgym.trajectories.paths.path import Path
-from ikgym.trajectories.paths.polyline import Polyline, Raster, Square
+from ikgym.trajectories.paths.polyline import Line, Polyline, Raster, Square
 from ikgym.trajectories.paths.round import Circle, CircularHelix, Lemniscate
 from ikgym.trajectories.paths.spline import SplinePath
 

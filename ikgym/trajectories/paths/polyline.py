@@ -1,4 +1,4 @@
-"""Straight lines joined by arcs: through points nearly, around a square, in a raster."""
+"""Straight lines, and lines joined by arcs: through points nearly, around a square, in a raster."""
 
 from __future__ import annotations
 
@@ -9,11 +9,38 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, Points
+from ikgym.trajectories.paths.path import MOST_POINTS, Outline, Path, Points, points_of
 from ikgym.validation import Bounds, FloatArray, Positive, Rotation, Vector, number
 
 # Corners that turn by less than this, in [rad], are none.
 STRAIGHT = 1e-9
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Line(Path):
+    """A straight line.
+
+    Args:
+        start: In [m]. Shape (3,).
+        end: In [m]. Shape (3,).
+
+    Raises:
+        InvalidInputError: A shape is wrong, or both are the same.
+    """
+
+    start: Vector
+    end: Vector
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        points_of("start and end", [self.start, self.end])
+        self._settle(length=float(np.linalg.norm(self.end - self.start)), curvature=0.0)
+
+    def along(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :meth:`Path.along`."""
+        share = (s / self.length)[:, None]
+        direction = (self.end - self.start) / self.length
+        return (1.0 - share) * self.start + share * self.end, np.tile(direction, (len(s), 1))
 
 
 class Pieces(NamedTuple):

@@ -14,7 +14,7 @@ from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.files import ResultsError
 from baselines.policy import Problem
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.random_agents import AHEAD, OFFSETS, network, random_agent, write_agent
 from tests.comparison import identical

@@ -50,7 +50,7 @@ def test_severities_scale_the_plant():
     field, bus = scenarios.get("panda-field"), scenarios.get("panda-bus")
     first, *_, last = at_severities(field, (0.0, 1.0))
     assert first.plant.ideal
-    assert last.plant == scenarios.imperfect.FIELD
+    assert last.plant == field.plant.scaled(2.0)
     assert at_severities(bus, (1, 0.5))[1].name == "panda-bus 0.5 1"
     for given in ("varga7-fast", [field, bus]):
         with pytest.raises(InvalidInputError, match="severities: expected one scenario whose plant is not ideal"):

@@ -16,7 +16,7 @@ from baselines.evaluation.metrics import TIME_COLUMNS, Row, describe
 from baselines.evaluation.results import COLUMNS, PAGE, Results, read_rows
 from baselines.evaluation.run import MOST, batches
 from baselines.files import ResultsError
-from baselines.spec import parse_policy
+from baselines.registry import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.evaluation.planning import planned
 

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 
 import baselines
-from baselines.policy import fields
+from baselines.policy import compiled
 
 
 def test_a_kernel_gets_numbers_and_derived_fields():
@@ -27,9 +27,9 @@ def test_subclasses_share_what_is_compiled():
 
 def test_every_process_finds_a_tuple_by_the_names_of_its_fields():
     """Machine code on disk refers to it; another order of the fields is another tuple."""
-    saved = pickle.dumps(fields.named_tuple(("first", "second")))
-    fields.named_tuple.cache_clear()
-    vars(fields).pop("Fields__first__second")
+    saved = pickle.dumps(compiled.named_tuple(("first", "second")))
+    compiled.named_tuple.cache_clear()
+    vars(compiled).pop("Fields__first__second")
     again = pickle.loads(saved)
     assert again(1, 2)._asdict() == {"first": 1, "second": 2}
-    assert again is fields.named_tuple(("first", "second")) is not fields.named_tuple(("second", "first"))
+    assert again is compiled.named_tuple(("first", "second")) is not compiled.named_tuple(("second", "first"))

@@ -19,7 +19,7 @@ POLICIES = ("qp", "qp_path", "sns", "rhc", "rhc_foresight", "agent_track", "offs
 
 
 def made(text):
-    name, parameters = baselines.spec.parse_policy(text)
+    name, parameters = baselines.registry.parse_policy(text)
     return baselines.make(name, SCENARIO, **parameters)
 
 
@@ -65,7 +65,7 @@ def test_the_observed_velocity_counts_where_an_episode_begins(text):
 def test_with_limits_of_jerk_rows_do_not_depend_on_each_other(text, shared, monkeypatch):
     """Also where one of several episodes begins anew: the changes of commands are remembered row by row."""
     scenario, rows = SCENARIO.replace(jerk_limit=2000.0), 3
-    name, parameters = baselines.spec.parse_policy(text)
+    name, parameters = baselines.registry.parse_policy(text)
     policy = baselines.make(name, scenario, **parameters)
     if shared:
         monkeypatch.setattr(threads, "count_cores", lambda: 2)

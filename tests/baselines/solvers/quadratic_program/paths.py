@@ -9,7 +9,7 @@ import ikgym
 from baselines.episodes import rollout
 from ikgym.trajectories import PathTrajectory
 from ikgym.trajectories.orientations import FixedOrientation
-from ikgym.trajectories.paths.line import Line
+from ikgym.trajectories.paths.polyline import Line
 from ikgym.trajectories.paths.round import Circle
 from ikgym.trajectories.time_laws import Quintic
 

@@ -9,7 +9,7 @@ from baselines.solvers.quadratic_program.among_bodies import largest_approach
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Box, Sphere
 from ikgym.trajectories import PathTrajectory
-from ikgym.trajectories.paths.line import Line
+from ikgym.trajectories.paths.polyline import Line
 from ikgym.trajectories.time_laws import Quintic
 from tests.baselines.solvers.quadratic_program.paths import circle, played
 from tests.comparison import identical

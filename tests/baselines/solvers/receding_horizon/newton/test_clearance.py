@@ -5,7 +5,7 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.policy.surroundings import sweep_bodies
+from baselines.policy.problem import sweep_bodies
 from baselines.solvers.receding_horizon.newton.barrier import ANEW, Barrier, linearise, merit
 from baselines.solvers.receding_horizon.newton.bodies import INFLUENCE, Clearance, clearance_workspace
 from baselines.solvers.receding_horizon.newton.clearance import is_clear, keep_clear
