@@ -91,9 +91,9 @@ class EpisodeProblem:
         """The problem on a grid, as the kernels see it."""
         change = self.scenario.dt * self.scenario.arm.acceleration_limit if self._by_interior_point else np.zeros(0)
         # Writable arrays are another type to numba, for which it would compile once more all that `rhc` calls.
-        limit, rest = read_only(change), np.zeros_like(self.start)
+        limit, equal, rest = read_only(change), read_only(np.ones_like(self.start)), np.zeros_like(self.start)
         load, clearance = self._load(grid), self.clearance
-        return PathProblem(self.data, grid, self.start, self.nominal, rest, 0.0, limit, False, load, clearance)
+        return PathProblem(self.data, grid, self.start, self.nominal, equal, rest, 0.0, limit, False, load, clearance)
 
     def _load(self, grid: Grid) -> FloatArray:
         """Offset of the joint zeros by the payload at the knots; (0, n) where there is none. Shape (K, n)."""

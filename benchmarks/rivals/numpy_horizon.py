@@ -2,8 +2,8 @@
 
 Over knots 1 … K behind a start q_0, with lengths h_k in steps and weights w_k, a plan q_1 … q_K costs
 ``Σ_k h_k Φ^U((q_k - q_{k-1}) / (h_k Δt)) + w_k Φ^X(error(X^N_k, F(q_k)))``; the horizon of HL grid points of
-Varga 2021, section III, has K = HL - 1 and h = w = 1. Written anew from the papers, so that it can find a slip in
-ikgym's kernels.
+Varga 2021, section III, has K = HL - 1 and h = w = 1. Φ^U may weigh the joints. Written anew from
+the papers, so that it can find a slip in ikgym's kernels.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ class Horizon:
         weights: Weights w of the tracking costs; all 1 if left out. Shape (K,).
         qdot: Joint velocities of the step that has passed, in [rad/s] or [m/s], where accelerations are limited; at
             rest if left out. Shape (n,).
+        joint_weights: Factors of the velocity costs of the joints; all 1 if left out. Shape (n,).
     """
 
     q: FloatArray
@@ -35,6 +36,7 @@ class Horizon:
     steps: FloatArray | None = None
     weights: FloatArray | None = None
     qdot: FloatArray | None = None
+    joint_weights: FloatArray | None = None
 
     @property
     def knots(self) -> int:
@@ -55,6 +57,12 @@ class Horizon:
     def qdot_before(self) -> FloatArray:
         """The joint velocities before, with the default filled in. Shape (n,)."""
         return np.zeros_like(self.q) if self.qdot is None else np.asarray(self.qdot, dtype=np.float64)
+
+    @property
+    def velocity_weights(self) -> FloatArray:
+        """The weights of the joints, with the default filled in. Shape (n,)."""
+        given = self.joint_weights
+        return np.ones_like(self.q) if given is None else np.asarray(given, dtype=np.float64)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,8 +87,8 @@ def plan_cost(problem: Problem, horizon: Horizon, q: FloatArray) -> float:
     cost, h = problem.cost, horizon.lengths
     qdot = np.diff(np.vstack([horizon.q, q]), axis=0) / (h[:, None] * problem.dt)
     errors = np.array(residual(problem)(q.T, horizon.nominal.T)).T
-    velocity = _powers(qdot / cost.delta_qdot, cost.p_in, cost.p_out)
-    tracking = _powers(errors, 2.0, cost.p_x)
+    velocity = _powers(qdot / cost.delta_qdot, cost.p_in, cost.p_out) @ horizon.velocity_weights
+    tracking = _powers(errors, 2.0, cost.p_x).sum(axis=-1)
     return float(h @ velocity + horizon.tracking_weights @ tracking)
 
 
@@ -106,4 +114,4 @@ def beyond_limits(problem: Problem, horizon: Horizon, q: FloatArray, braking: bo
 
 def _powers(x: FloatArray, inside: float, outside: float) -> FloatArray:
     r = np.abs(x)
-    return np.asarray(np.where(r > 1.0, r**outside, r**inside).sum(axis=-1))
+    return np.asarray(np.where(r > 1.0, r**outside, r**inside))

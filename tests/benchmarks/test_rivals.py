@@ -1,5 +1,7 @@
 """Other people's solvers see the same problem, and find its optimum."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
-from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost
+from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost, joint_weights
 
 
 def problem_of(arm: Arm, task: str = "skew", **cost: float) -> Problem:
@@ -36,6 +38,7 @@ PAIRS = [*(("varga7", task) for task in ikgym.tasks.names()), *((name, "pose") f
 def test_the_cost_is_that_of_the_kernels(arm, task):
     problem = problem_of(ikgym.arms.get(arm), task, p_x=3.5, p_in=2.0)
     horizon, plan = random_horizon(problem, 4)
+    horizon = dataclasses.replace(horizon, joint_weights=joint_weights(problem.model.joints))
     qdot = np.diff(np.vstack([horizon.q, plan]), axis=0) / problem.dt
     kernels = horizon_cost(data_of(problem), horizon.q, horizon.nominal, qdot)
     assert plan_cost(problem, horizon, plan) == pytest.approx(kernels, rel=1e-9)

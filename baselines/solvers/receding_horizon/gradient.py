@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.policy_kernels import Model
+from baselines.policy.compiled import derived
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
@@ -21,7 +22,8 @@ from baselines.solvers.receding_horizon.descent import (
     stop_test,
     take_step,
 )
-from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
+from baselines.solvers.receding_horizon.horizon import HorizonModel, analytic_gradient, difference_gradient
+from baselines.solvers.resolved_rate.base import relative_weights
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.kernels.limits import FASTEST
@@ -65,6 +67,7 @@ class RecedingHorizonGradient(SolverPolicy):
             on by one grid point, its last velocity being repeated.
         gradient: ``"finite_difference"`` as in the paper, or ``"analytic"``.
         difference: The finite difference of the joint velocities, in [rad/s] or [m/s]. From 1e-9 to 1.
+        joint_weights: See :class:`rhc.RecedingHorizon`.
 
     Raises:
         InvalidInputError: A parameter is out of its range.
@@ -81,6 +84,9 @@ class RecedingHorizonGradient(SolverPolicy):
     warm_start: Literal["unshifted", "shifted"] = "unshifted"
     gradient: Literal["finite_difference", "analytic"] = "finite_difference"
     difference: Annotated[float, Bounds(at_least=SMALLEST_DIFFERENCE, at_most=1.0)] = 1e-3
+    joint_weights: float | Sequence[float] = 1.0
+    #: These in units of the smallest one. Shape (n,).
+    weights: FloatArray = derived()
 
     name: ClassVar[str] = "rhc_gradient"
     grain: ClassVar[int] = 1
@@ -91,6 +97,8 @@ class RecedingHorizonGradient(SolverPolicy):
             raise InvalidInputError(
                 f"alpha_max: expected at least alpha_min = {self.alpha_min:g}, got {self.alpha_max:g}."
             )
+        weights = relative_weights("joint_weights", self.joint_weights, self.problem.model.joints)
+        self._settle(weights=weights)
 
     @property
     def preview(self) -> int:
@@ -119,7 +127,7 @@ class RecedingHorizonGradient(SolverPolicy):
         return DescentMemory(plan, alpha)
 
     @functools.cached_property
-    def _constants(self) -> tuple[Model, DescentSettings]:
+    def _constants(self) -> tuple[HorizonModel, DescentSettings]:
         """The arguments of the kernel that never change."""
         settings = DescentSettings(
             tolerance=self.tolerance,
@@ -129,7 +137,7 @@ class RecedingHorizonGradient(SolverPolicy):
             alpha_factor=self.alpha_factor,
             difference=self.difference if self.gradient == "finite_difference" else 0.0,
         )
-        return self.problem.kernel_model, settings
+        return HorizonModel(*self.problem.kernel_model, self.weights), settings
 
     def _descend(self) -> Any:
         """The kernel of the descent."""
@@ -145,7 +153,7 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
     """Gradient descent row by row.
 
     Args:
-        data: The :class:`baselines.policy_kernels.Model`.
+        data: The :class:`horizon.HorizonModel`.
         settings: :class:`DescentSettings`.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).

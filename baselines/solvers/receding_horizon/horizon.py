@@ -12,10 +12,44 @@ import numpy.typing as npt
 
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
+from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.kernels.kinematics import forward, forward_and_jacobian
+from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
+
+
+class HorizonModel(NamedTuple):
+    """A :class:`baselines.policy_kernels.Model`, and the weights of its joints.
+
+    Attributes, besides those of the model:
+        joint_weights: Factors of the velocity costs of the joints. Shape (n,).
+    """
+
+    chain: Chain
+    kind: int
+    cost: CostParameters
+    dt: float
+    velocity_limit: Floats
+    limits: Floats
+    joint_weights: Floats
+
+
+@kernel
+def velocity_cost(data, qdot):
+    """Φ^U of one step with the weights of a :class:`HorizonModel`. Shape of ``qdot`` (n,)."""
+    cost, weights, total = data.cost, data.joint_weights, 0.0
+    for j in range(qdot.shape[0]):
+        total += weights[j] * cost_kernels.value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
+    return total
+
+
+@kernel
+def velocity_gradient(data, qdot, out):
+    """Its derivative by q̇. Shapes (n,)."""
+    cost, weights = data.cost, data.joint_weights
+    for j in range(qdot.shape[0]):
+        out[j] = weights[j] * cost_kernels.gradient(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
 
 @inner
@@ -23,7 +57,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
     """∂Φ/∂q̇ by forward differences (Varga 2021, section IV), and Φ, the sum of the stage costs over the horizon.
 
     Args:
-        data: The :class:`baselines.policy_kernels.Model`; limits do not count.
+        data: The :class:`HorizonModel`; limits do not count.
         q: Joint coordinates at the first grid point. Shape (n,).
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         qdot: Joint velocities, put back as they were. Shape (HL - 1, n).
@@ -62,7 +96,7 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
         for j in range(here.shape[0]):
             here[j] += data.dt * qdot[i, j]  # eq. 5
         tracking_error(data, nominal[i], here, workspace, error)
-        stages[i] = cost_kernels.tracking(cost, error) + cost_kernels.velocity(cost, qdot[i])
+        stages[i] = cost_kernels.tracking(cost, error) + velocity_cost(data, qdot[i])
         total += stages[i]
     return total
 
@@ -114,15 +148,14 @@ def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     ``q`` are the joint coordinates at the second and later grid points; all arrays have the shape (HL - 1, n).
     """
     steps, n = q.shape
-    chain, cost = data.chain, data.cost
-    workspace = gradient_workspace(data.kind, nominal, n)
+    chain, workspace = data.chain, gradient_workspace(data.kind, nominal, n)
     rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     total = 0.0
     for i in range(steps):
         forward_and_jacobian(chain, q[i], rotation, position, geometric)
         tracking = _tracking_gradient(data, nominal[i], workspace, by_q[i])
-        total += tracking + cost_kernels.velocity(cost, qdot[i])
-        cost_kernels.velocity_gradient(cost, qdot[i], by_qdot[i])
+        total += tracking + velocity_cost(data, qdot[i])
+        velocity_gradient(data, qdot[i], by_qdot[i])
     return total
 
 
@@ -138,7 +171,7 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     error = workspace[3]
     for i in range(steps):
         tracking_error(data, nominal[i], q[i], workspace, error)
-        tracking, velocity = cost_kernels.tracking(cost, error), cost_kernels.velocity(cost, qdot[i])
+        tracking, velocity = cost_kernels.tracking(cost, error), velocity_cost(data, qdot[i])
         total += tracking + velocity
         for j in range(n):
             kept = q[i, j]
@@ -148,7 +181,7 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
             q[i, j] = kept
             kept = qdot[i, j]
             qdot[i, j] = kept + delta
-            by_qdot[i, j] = (cost_kernels.velocity(cost, qdot[i]) - velocity) / delta
+            by_qdot[i, j] = (velocity_cost(data, qdot[i]) - velocity) / delta
             qdot[i, j] = kept
     return total
 

@@ -75,6 +75,7 @@ class RecedingHorizonLagrange(RecedingHorizonGradient):
         warm_start: ``"unshifted"`` or ``"shifted"``.
         gradient: ``"finite_difference"`` or ``"analytic"``.
         difference: The finite difference δ of the joint velocities, from 1e-9 to 1; Δt δ is that of all coordinates.
+        joint_weights: See :class:`RecedingHorizonGradient`.
         states: Whether the task coordinates are unknowns, as in the paper, or are eliminated.
 
     Raises:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -23,6 +24,7 @@ from baselines.policy.problem import sweep_bodies
 from baselines.solvers.receding_horizon.newton.grid import offsets
 from baselines.solvers.receding_horizon.newton.receding import HorizonMemory, plan_step, plan_step_among
 from baselines.solvers.receding_horizon.newton.settings import PlanSettings, plain_settings
+from baselines.solvers.resolved_rate.base import relative_weights
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios.preview import FARTHEST
 from ikgym.validation import Bounds, Flag, FloatArray, IntArray, read_only
@@ -88,6 +90,10 @@ class RecedingHorizon(CompiledPolicy):
         rate_weight: Cost of changes of velocity in the plan, rate_weight · Σ (q̇_k - q̇_{k-1})² over joints and steps,
             in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; the first change is that from the velocity last applied. The
             score has no such term: smooth velocities have their price. 0 for none.
+        joint_weights: w, above 0: how costly the motion of a joint is, as a factor of its velocity cost; only ratios
+            count, and the smallest one means the cost itself. One number, or one a joint. Equal by default, unlike
+            those of `qp`: the plan is then the optimum of the cost that is scored. They act less than in `qp`: against
+            a cost of the fourth power a velocity falls with the cube root of w.
         tolerance: Relative precision of the horizon's cost at which it counts as minimal.
         clearance: The distance in [m] that bodies keep at the knots of a plan, where they may not touch.
 
@@ -106,6 +112,7 @@ class RecedingHorizon(CompiledPolicy):
     start_steps: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
     recovery_steps: Annotated[int, Bounds(at_least=0, at_most=MOST)] = 0
     rate_weight: Annotated[float, Bounds(at_least=0.0)] = 0.0
+    joint_weights: float | Sequence[float] = 1.0
     tolerance: Annotated[float, Bounds(above=0.0)] = 1e-7
     clearance: Annotated[float, Bounds(at_least=0.0)] = 1e-3
 
@@ -136,6 +143,7 @@ class RecedingHorizon(CompiledPolicy):
         change = problem.dt * model.acceleration_limit if self.interior_point else np.zeros(0)
         given = {name: getattr(self, name) for name in PlanSettings._fields if name in self.parameters}
         given |= {"at": knots, "change_limit": change, "iterations": -1 if self.iterations is None else self.iterations}
+        given["joint_weights"] = relative_weights("joint_weights", self.joint_weights, model.joints)
         settings = PlanSettings(**given)
         reals, integers = plain_settings(settings)
         sweep = read_only(sweep_bodies(model) if self.among_bodies else np.empty((0, model.joints)))

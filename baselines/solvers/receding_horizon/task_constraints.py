@@ -17,6 +17,8 @@ from baselines.solvers.receding_horizon.horizon import (
     gradient_workspace,
     linearise,
     tracking_error,
+    velocity_cost,
+    velocity_gradient,
 )
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.jit import inner, kernel
@@ -80,7 +82,7 @@ def reduced_task_gradient(data, nominal, difference, x, system, gradient):
     """The reduced gradient by all unknowns, and Φ, infinite where the system of the multipliers cannot be solved.
 
     Args:
-        data: The :class:`baselines.policy_kernels.Model`; limits do not count.
+        data: The :class:`horizon.HorizonModel`; limits do not count.
         nominal: Nominal coordinates of the second and later grid points. Shape (at least HL - 1, m).
         difference: The finite difference δ of the velocities, 0 for analytic derivatives.
         x: :class:`Unknowns`.
@@ -110,9 +112,9 @@ def analytic_task_gradient(data, nominal, x, jacobian, gradient):
         forward_and_jacobian(data.chain, x.q[i], workspace.rotation, workspace.position, workspace.geometric)
         linearise(data.kind, nominal[i], workspace)
         jacobian[i] = workspace.error_jacobian
-        total += cost_kernels.tracking(data.cost, x.errors[i]) + cost_kernels.velocity(data.cost, x.qdot[i])
+        total += cost_kernels.tracking(data.cost, x.errors[i]) + velocity_cost(data, x.qdot[i])
         cost_kernels.tracking_gradient(data.cost, x.errors[i], gradient.errors[i])
-        cost_kernels.velocity_gradient(data.cost, x.qdot[i], gradient.qdot[i])
+        velocity_gradient(data, x.qdot[i], gradient.qdot[i])
     return total
 
 
@@ -124,7 +126,7 @@ def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
     total = 0.0
     for i in range(steps):
         tracking = cost_kernels.tracking(data.cost, x.errors[i])
-        velocity = cost_kernels.velocity(data.cost, x.qdot[i])
+        velocity = velocity_cost(data, x.qdot[i])
         total += tracking + velocity
         for a in range(e):
             kept = x.errors[i, a]
@@ -141,7 +143,7 @@ def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
                 jacobian[i, a, j] = (shifted[a] - here[a]) / small
             kept = x.qdot[i, j]
             x.qdot[i, j] = kept + delta
-            gradient.qdot[i, j] = (cost_kernels.velocity(data.cost, x.qdot[i]) - velocity) / delta
+            gradient.qdot[i, j] = (velocity_cost(data, x.qdot[i]) - velocity) / delta
             x.qdot[i, j] = kept
     return total
 

@@ -18,7 +18,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner, uncounted
 from ikgym.kernels.kinematics import forward_and_jacobian
-from ikgym.validation import Bounds, FloatArray, per_joint
+from ikgym.validation import Bounds, FloatArray, per_joint, read_only
 
 APPLIED, DEFICIENT = int(Status.APPLIED), int(Status.RANK_DEFICIENT)
 # Joints count as slow below this share of the largest velocity, and how much costlier they are by default, see
@@ -109,6 +109,12 @@ def check_weights(name: str, weights: float | Sequence[float], joints: int) -> F
     if not (array > 0.0).all():
         raise InvalidInputError(f"{name}: expected numbers above 0, got {array.tolist()}.")
     return array
+
+
+def relative_weights(name: str, weights: float | Sequence[float], joints: int) -> FloatArray:
+    """The same in units of the smallest one, read-only. Shape (n,)."""
+    array = check_weights(name, weights, joints)
+    return read_only(array / array.min())
 
 
 @inner

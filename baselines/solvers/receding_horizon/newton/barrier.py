@@ -48,7 +48,7 @@ def merit(problem, path, barrier, workspace):
     """The barrier function."""
     data, grid, start = problem.data, problem.grid, problem.start
     cost, dt, mu, weight = data.cost, data.dt, barrier.mu, barrier.limit_weight
-    lengths, tracking, velocities = grid.length, grid.tracking, grid.velocity
+    lengths, tracking, velocities, joint_weights = grid.length, grid.tracking, grid.velocity, problem.joint_weights
     lower, upper, limits, changes = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST], problem.change_limit
     errors, before = tracking_errors(problem, path, workspace), workspace.before
     (knots, n), e, steepness = path.shape, errors.shape[1], kink_steepness(cost)
@@ -68,7 +68,7 @@ def merit(problem, path, barrier, workspace):
             before[j], limit, most = velocity, limits[j], span * changes[j]
             way = braking_way(velocity, dt / changes[j]) if ends else 0.0
             if velocities[k] != 0.0:
-                total += velocities[k] * velocity_cost(cost, velocity)
+                total += velocities[k] * joint_weights[j] * velocity_cost(cost, velocity)
             total += _value(velocity, -limit, limit, limit, weight, mu)
             total += _value(change, -most, most, most, weight, mu)
             total += _value(path[k, j] + way, lower[j], upper[j], dt * limit, weight, mu)
@@ -149,6 +149,7 @@ def _add_motion(problem, path, barrier, advance, workspace):
     """Adds the velocity costs and the limits of velocity, acceleration and position; gives their value."""
     data, start, cost, dt = problem.data, problem.start, problem.data.cost, problem.data.dt
     lengths, velocities, braking = problem.grid.length, problem.grid.velocity, problem.braking
+    joint_weights = problem.joint_weights
     lower, upper, limits, changes = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST], problem.change_limit
     model, barriers, before = workspace.model, workspace.barriers, workspace.before
     gradient, diagonal, coupling, far = model.gradient, model.diagonal, model.coupling, model.far
@@ -167,13 +168,14 @@ def _add_motion(problem, path, barrier, advance, workspace):
             reach = path[k, j] + braking_way(velocity, per)
             place = bounded(barriers, k, e + 2 * n + j, reach, lower[j], upper[j], dt * limit, weight, mu, advance)
             first, twice = velocity_derivatives(cost, velocity)
-            total += velocities[k] * velocity_cost(cost, velocity) + speed.value + turn.value + place.value
+            count = velocities[k] * joint_weights[j]
+            total += count * velocity_cost(cost, velocity) + speed.value + turn.value + place.value
             # The place reached, q + v |v| / (2 q̈_max), by the chain rule; its curvature where it is convex.
             further = per * abs(velocity)
             own = max(math.copysign(per, velocity) * place.gradient, 0.0)
-            by_velocity = (velocities[k] * first + speed.gradient + place.gradient * further) * rate
+            by_velocity = (count * first + speed.gradient + place.gradient * further) * rate
             mixed = place.curvature * further * rate
-            curved = velocities[k] * twice + speed.curvature + place.curvature * further * further + own
+            curved = count * twice + speed.curvature + place.curvature * further * further + own
             curved *= rate * rate
             a, c, turned = rate, rate_before, turn.curvature
             gradient[k, j] += by_velocity + place.gradient + turn.gradient * a

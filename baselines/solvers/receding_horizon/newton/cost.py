@@ -120,7 +120,7 @@ def tracking_errors(problem, path, workspace):
 @uncounted
 def true_cost(problem, path, workspace):
     """The cost of a path, from the same kernels as the environment's; limits apart."""
-    data, grid, start = problem.data, problem.grid, problem.start
+    data, grid, start, weights = problem.data, problem.grid, problem.start, problem.joint_weights
     cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
     errors = tracking_errors(problem, path, workspace)
     total = 0.0
@@ -130,7 +130,7 @@ def true_cost(problem, path, workspace):
         rate = 1.0 / (lengths[k] * data.dt)
         for j in range(path.shape[1]):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
-            total += velocities[k] * velocity_cost(cost, velocity)
+            total += velocities[k] * weights[j] * velocity_cost(cost, velocity)
     if problem.rate_weight > 0.0:
         total += rate_cost(problem, path)
     return total
@@ -139,7 +139,7 @@ def true_cost(problem, path, workspace):
 @uncounted
 def merit(problem, path, multipliers, workspace):
     """The smooth function that Newton's method minimises: the cost with its kinks and limits held by multipliers."""
-    data, grid, start = problem.data, problem.grid, problem.start
+    data, grid, start, weights = problem.data, problem.grid, problem.start, problem.joint_weights
     cost, lengths, tracking, velocities = data.cost, grid.length, grid.tracking, grid.velocity
     lower, upper, limits = data.limits[LOWER], data.limits[UPPER], data.limits[FASTEST]
     factor = workspace.knot.penalty_factor[0]
@@ -156,7 +156,7 @@ def merit(problem, path, multipliers, workspace):
         for j in range(n):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
             if velocities[k] != 0.0:
-                total += velocities[k] * velocity_cost(cost, velocity)
+                total += velocities[k] * weights[j] * velocity_cost(cost, velocity)
             if multipliers[k, e + j] != 0.0 or abs(velocity) > limits[j]:
                 total += velocity_limit_term(data, j, velocity, multipliers[k, e + j], factor).value
             if multipliers[k, e + n + j] != 0.0 or path[k, j] < lower[j] or path[k, j] > upper[j]:
@@ -182,7 +182,7 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
         The :class:`Values` of the path.
     """
     data, grid, start, nominal = problem.data, problem.grid, problem.start, problem.nominal
-    cost, kind, chain, dt = data.cost, data.kind, data.chain, data.dt
+    cost, kind, chain, dt, weights = data.cost, data.kind, data.chain, data.dt, problem.joint_weights
     at, lengths, tracking, velocities = grid.at, grid.length, grid.tracking, grid.velocity
     knot, model = workspace.knot, workspace.model
     rotation, position, geometric, pose = knot.rotation, knot.position, knot.geometric, knot.pose
@@ -227,11 +227,12 @@ def linearise(problem, path, multipliers, advance, exact, workspace):
             velocity = (path[k, j] - (path[k - 1, j] if k > 0 else start[j])) * rate
             by_velocity = by_velocity_twice = 0.0
             if velocities[k] != 0.0:
-                value = velocities[k] * velocity_cost(cost, velocity)
+                count = velocities[k] * weights[j]
+                value = count * velocity_cost(cost, velocity)
                 total += value
                 true += value
                 first, twice = velocity_derivatives(cost, velocity)
-                by_velocity, by_velocity_twice = velocities[k] * first, velocities[k] * twice
+                by_velocity, by_velocity_twice = count * first, count * twice
             held = e + j
             if multipliers[k, held] != 0.0 or abs(velocity) > limits[j]:
                 if advance:

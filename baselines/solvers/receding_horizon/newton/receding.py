@@ -84,8 +84,9 @@ def plan_step_among(model, numbers, batch, solution):
 @expanded
 def plan_rows(model, numbers, batch, solution, clearance):
     """:func:`plan_step` with a :class:`bodies.Clearance`, whose boxes are those of each row or of all, or with None."""
-    settings = settings_of(numbers.reals, numbers.integers)
-    knots, n, plans = settings.at.shape[0], batch.q.shape[1], solution.memory.plans
+    n, plans = batch.q.shape[1], solution.memory.plans
+    settings = settings_of(numbers.reals, numbers.integers, n)
+    knots = settings.at.shape[0]
     limited, width = settings.change_limit.shape[0] > 0, plans.shape[2] // knots - n
     workspace = plan_workspace(model.kind, batch.nominal.shape[2], knots, n, width, limited, clearance)
     plan_batch(model, settings, batch, solution, clearance, workspace)
@@ -113,6 +114,7 @@ def plan_batch(data, settings, batch, solution, clearance, workspace):
             grid,
             q,
             batch.nominal[row],
+            settings.joint_weights,
             qdot_before,
             settings.rate_weight,
             settings.change_limit,

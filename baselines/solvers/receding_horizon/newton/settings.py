@@ -19,6 +19,7 @@ class PlanSettings(NamedTuple):
     Attributes, where they are not the parameters themselves:
         at: Steps from now to the knots. Shape (K,).
         iterations: Newton steps in one period; -1 to the optimum.
+        joint_weights: Factors of the velocity costs of the joints. Shape (n,).
         change_limit: Largest changes of velocity in one step, see :class:`workspace.PathProblem`. Shape (n or 0,).
     """
 
@@ -33,6 +34,7 @@ class PlanSettings(NamedTuple):
     start_steps: int
     recovery_steps: int
     rate_weight: float
+    joint_weights: Floats
     change_limit: Floats
 
 
@@ -42,7 +44,7 @@ def plain_settings(settings: PlanSettings) -> tuple[Floats, Integers]:
     A `predict` takes arguments apart at 0.1 µs each, which for all of them one by one is longer than a Newton step.
     """
     s = settings
-    numbers = np.array([s.terminal_weight, s.tolerance, s.rate_weight, *s.change_limit])
+    numbers = np.array([s.terminal_weight, s.tolerance, s.rate_weight, *s.joint_weights, *s.change_limit])
     steps = s.iterations, s.starts, s.restart_steps, s.seed, s.start_steps, s.recovery_steps
     integers = np.array([s.stop_at_end, *steps, *s.at], dtype=np.int64)
     for block in (numbers, integers):
@@ -51,8 +53,8 @@ def plain_settings(settings: PlanSettings) -> tuple[Floats, Integers]:
 
 
 @expanded
-def settings_of(numbers, integers):
-    """The :class:`PlanSettings` that :func:`plain_settings` took apart."""
+def settings_of(numbers, integers, n):
+    """The :class:`PlanSettings` that :func:`plain_settings` took apart, for n joints."""
     return PlanSettings(
         integers[7:],
         numbers[0],
@@ -65,5 +67,6 @@ def settings_of(numbers, integers):
         integers[5],
         integers[6],
         numbers[2],
-        numbers[3:],
+        numbers[3 : 3 + n],
+        numbers[3 + n :],
     )

@@ -30,6 +30,7 @@ class PathProblem(NamedTuple):
         grid: The time grid, of K knots.
         start: Joint coordinates now, in [rad] or [m]. Shape (n,).
         nominal: Nominal task coordinates 1, 2, … steps ahead. Shape (at least grid.at[-1], m).
+        joint_weights: Factors of the velocity costs of the joints. Shape (n,).
         qdot_before: Joint velocities of the step that has passed, in [rad/s] or [m/s]; read where changes of velocity
             cost something. Shape (n,).
         rate_weight: Weight of changes of velocity, in [cost] / [(rad/s)²] or [cost] / [(m/s)²]; see :mod:`cost`.
@@ -46,6 +47,7 @@ class PathProblem(NamedTuple):
     grid: Grid
     start: Floats
     nominal: Floats
+    joint_weights: Floats
     qdot_before: Floats = NO_VELOCITY
     rate_weight: float = 0.0
     change_limit: Floats = NO_VELOCITY

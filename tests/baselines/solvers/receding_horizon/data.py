@@ -5,17 +5,24 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.horizon import analytic_gradient
+from baselines.solvers.receding_horizon.horizon import HorizonModel, analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
+from ikgym.validation import read_only
 
 HORIZONS = pytest.mark.parametrize(
     ("kind", "horizon"), [("finite_difference", 3), ("finite_difference", 6), ("analytic", 4)]
 )
 
 
+def joint_weights(joints):
+    """Weights of the joints, all of them different."""
+    return read_only(np.linspace(1.0, 3.0, joints))
+
+
 def data_of(problem):
-    """Of a scenario or a problem."""
-    return Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit).kernel_model
+    """Of a scenario or a problem, with weights of the joints."""
+    problem = Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit)
+    return HorizonModel(*problem.kernel_model, joint_weights(problem.model.joints))
 
 
 def horizon_cost(data, q, nominal, qdot):
