@@ -47,6 +47,7 @@ class CasadiHorizon:
         knots: K, the number of knots.
         limited: Whether the limits of position, velocity and acceleration count.
         braking: Whether the arm has to be able to stop within its joint limits behind the last knot, too.
+        rate_weight: Weight of the squared changes of joint velocity, each over the time steps between the two.
         options: Of CasADi's `nlpsol`, over those of :data:`OPTIONS`.
 
     Raises:
@@ -58,6 +59,7 @@ class CasadiHorizon:
     knots: int
     limited: bool = False
     braking: bool = False
+    rate_weight: float = 0.0
     options: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,19 +74,21 @@ class CasadiHorizon:
 
     @functools.cached_property
     def solver(self) -> Any:
-        """The compiled problem, made once: variables y, t; parameters q_0, nominal, h, w, q̇ before, joint weights."""
+        """The compiled problem, made once: variables y, t; parameters q_0, the nominal coordinates, h, w, q̇ before."""
         problem, knots = self.problem, self.knots
         n, m, e = problem.model.joints, problem.task.size, problem.task.error_size
         y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
         start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
         h, w, before = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots), casadi.SX.sym("qdot", n)
-        weights, error = casadi.SX.sym("weights", n), residual(problem)
+        error = residual(problem)
         cost, power = casadi.SX(0), int(problem.cost.p_x)
-        above = []
+        above, last, length = [], before, casadi.SX(1)
         for k in range(knots):
             qdot = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
-            cost += h[k] * casadi.dot(weights, (qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
+            cost += h[k] * casadi.sum1((qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
             cost += w[k] * casadi.sum1(t[:, k])
+            cost += self.rate_weight * casadi.sumsqr(qdot - last) / (0.5 * (length + h[k]))
+            last, length = qdot, h[k]
             r = error(start + problem.dt * y[:, k], nominal[:, k])
             above.append(t[:, k] - r**2)
             if power > 2:
@@ -93,7 +97,7 @@ class CasadiHorizon:
             above += self._room(start, y, h, before)
         nlp = {
             "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
-            "p": casadi.vertcat(start, casadi.vec(nominal), h, w, before, weights),
+            "p": casadi.vertcat(start, casadi.vec(nominal), h, w, before),
             "f": cost,
             "g": casadi.vertcat(*above),
         }
@@ -124,10 +128,7 @@ class CasadiHorizon:
         answer = self.solver(
             x0=np.concatenate([y.ravel(), t.T.ravel()]),
             p=np.concatenate(
-                [
-                    *(horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights),
-                    *(horizon.qdot_before, horizon.velocity_weights),
-                ]
+                [horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights, horizon.qdot_before]
             ),
             lbg=0.0,
             ubg=np.inf,

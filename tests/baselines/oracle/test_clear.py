@@ -8,7 +8,7 @@ from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle import Search, solve
 from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.search import polish
-from ikgym.obstacles import Sphere
+from tests.bodied import ball_in_the_way
 
 SEED, STEPS = 3, 100
 QUICK = Search(starts=6, generations=1, chains=2, rounds=2, polished=2, knots=20)
@@ -22,14 +22,7 @@ def free():
 
 @pytest.fixture(scope="module")
 def ball(free):
-    """A ball that the cheapest path goes some millimetres into."""
-    before, after = (FREE.arm.joint_points(q)[3, 0] for q in (free.q[0], free.q[-1]))
-    ahead = (after - before) / np.linalg.norm(after - before)
-    for shift in np.linspace(0.2, 0.0, 401):
-        ball = Sphere("ball", after + shift * ahead, 0.05)
-        if FREE.arm.clearance(free.q, [ball])[0].min() < -2e-3:
-            return ball
-    raise AssertionError
+    return ball_in_the_way(FREE.arm, free.q)
 
 
 def test_the_best_path_is_clear_and_costs_more(free, ball):

@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.optimize import linprog
 
 import baselines
 import ikgym
@@ -43,6 +44,14 @@ def _scenario(arm, path, law, dt, wait, **changes):
         **changes,
     }
     return ikgym.Scenario("path", arm, trajectory=trajectory, **given)
+
+
+def most_possible(jacobian, shift, lower, upper):
+    """The largest s from 0 to 1 for which bounds allow s Δx, by a linear program; 0 where they allow nothing."""
+    n, scale = jacobian.shape[1], np.linalg.norm(shift)
+    columns, bounds = np.hstack([jacobian, -shift[:, None]]) / scale, [*zip(lower, upper, strict=True), (0.0, 1.0)]
+    found = linprog(-np.eye(n + 1)[n], A_eq=columns, b_eq=np.zeros(len(shift)), bounds=bounds)
+    return found.x[n] if found.success else 0.0
 
 
 def played(scenario, name="qp", **parameters):

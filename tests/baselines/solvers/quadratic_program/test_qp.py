@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog, lsq_linear
+from scipy.optimize import lsq_linear
 
 import baselines
 import ikgym
@@ -10,7 +10,7 @@ from baselines.policy import Batch
 from baselines.solvers.quadratic_program.velocity_box import velocity_box
 from baselines.solvers.resolved_rate.base import NominalMemory
 from baselines.status import Status
-from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
+from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, most_possible, played
 from tests.limited import limited
 
 #: SciPy gives up early by default.
@@ -126,34 +126,35 @@ def test_scaling_keeps_the_direction_and_makes_the_most_of_it():
     solution = policy.solve(batch, memory)
     for i in range(100):
         _, _, bounds, jacobian, shift = program(policy, batch, memory, i)
-        n, length = len(solution.qdot[i]), np.linalg.norm(shift)
-        columns = np.hstack([jacobian, -shift[:, None]]) / length
-        most = linprog(
-            -np.eye(n + 1)[n], A_eq=columns, b_eq=np.zeros(6), bounds=[*zip(*bounds, strict=True), (0.0, 1.0)]
-        )
-        if not most.success or most.x[n] < 1e-3:
+        most, length = most_possible(jacobian, shift, *bounds), np.linalg.norm(shift)
+        if most < 1e-3:
             continue
         made = jacobian @ solution.qdot[i]
         s = made @ shift / length**2
-        assert np.linalg.norm(made - s * shift) < (0.1 * (1.0 - most.x[n]) + 1e-3) * length
-        assert s > 0.99 * most.x[n]
-        scaled += most.x[n] < 0.95
+        assert np.linalg.norm(made - s * shift) < (0.1 * (1.0 - most) + 1e-3) * length
+        assert s > 0.99 * most
+        scaled += most < 0.95
     assert scaled > 5
 
 
-def test_scaling_stays_on_a_path_within_all_limits():
-    episode = played(circle("tiago", dt=4e-3), task_scaling=True)
+@pytest.mark.parametrize(("name", "parameters"), [("qp", {"task_scaling": True}), ("sns", {})])
+def test_scaling_stays_on_a_path_within_all_limits(name, parameters):
+    episode = played(circle("tiago", dt=4e-3), name, **parameters)
     assert episode.position_error.max() < 5e-5
     assert not episode.at_limit.any()
     assert (episode.status == Status.APPLIED).all()
 
 
 @pytest.mark.parametrize(
-    ("scenario", "scaling"), [(beyond_reach(), False), (circle(radius=0.15, speed=2.5, acceleration=40.0), True)]
+    ("scenario", "name", "parameters"),
+    [
+        *((beyond_reach(), name, {}) for name in ("qp", "sns")),
+        (circle(radius=0.15, speed=2.5, acceleration=40.0), "qp", {"task_scaling": True}),
+    ],
 )
-def test_no_limit_is_met_off_the_path(scenario, scaling):
+def test_no_limit_is_met_off_the_path(scenario, name, parameters):
     """Beyond the reach, and above the velocity limits."""
-    episode = played(scenario, task_scaling=scaling)
+    episode = played(scenario, name, **parameters)
     assert episode.position_error.max() > 0.02
     assert not episode.at_limit.any()
     assert {*episode.status} == {Status.APPLIED, Status.SATURATED}

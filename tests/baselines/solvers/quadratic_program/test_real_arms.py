@@ -7,13 +7,15 @@ import ikgym
 from baselines.status import Status
 from tests.baselines.solvers.quadratic_program.paths import played
 
-FEASIBLE = {"panda-lemniscate": 1e-5, "panda-glue": 1e-5, "iiwa14-square": 1e-5, "tiago-raster": 5e-5}
+FEASIBLE = {"panda-lemniscate": 1e-5, "panda-glue": 1e-5, "panda-line": 1e-5, "iiwa14-square": 1e-5}
+FEASIBLE |= {"iiwa14-circle": 1e-5, "iiwa14-glue": 1e-5, "tiago-raster": 5e-5, "tiago-glue": 5e-5}
 
 
 @pytest.mark.parametrize(("name", "bar"), FEASIBLE.items())
 def test_feasible_paths_are_met(name, bar):
     episode = played(ikgym.scenarios.get(name))
     assert episode.position_error.max() < bar
+    assert episode.orientation_error.max() < 1e-4
     assert not episode.at_limit.any()
     assert (episode.status == Status.APPLIED).all()
 

@@ -1,24 +1,14 @@
-"""Saturation in the null space against its source, a linear program, and in motion."""
+"""Saturation in the null space against its source and a linear program; in motion beside `qp`."""
 
 import numpy as np
-from scipy.optimize import linprog
 
 from baselines.solvers.quadratic_program.sns import saturate
-from baselines.status import Status
-from tests.baselines.solvers.quadratic_program.paths import beyond_reach, circle, played
+from tests.baselines.solvers.quadratic_program.paths import most_possible
 
 
 def saturated(jacobian, shift, lower, upper, damping=0.0):
     qdot = np.empty(jacobian.shape[1])
     return qdot, *saturate(jacobian, shift, damping, lower, upper, qdot)
-
-
-def most_possible(jacobian, shift, lower, upper):
-    """The largest s from 0 to 1 for which the bounds allow s Δx."""
-    n = jacobian.shape[1]
-    bounds = [*zip(lower, upper, strict=True), (0.0, 1.0)]
-    found = linprog(-np.eye(n + 1)[n], A_eq=np.hstack([jacobian, -shift[:, None]]), b_eq=shift * 0, bounds=bounds)
-    return found.x[n]
 
 
 def test_the_others_make_up_for_a_joint_at_its_bound():
@@ -69,17 +59,3 @@ def test_bounds_that_leave_out_0_are_kept():
     qdot, _, scaled = saturated(jacobian[:, :1], shift, lower[:1], upper[:1])
     assert (qdot[0], scaled) == (0.5, True)
     assert saturated(np.zeros((2, 3)), np.ones(2), lower, upper)[0].tolist() == [0.5, 0.0, 0.0]
-
-
-def test_stays_on_a_path_within_all_limits():
-    episode = played(circle("tiago", 4e-3), "sns")
-    assert episode.position_error.max() < 5e-5
-    assert not episode.at_limit.any()
-    assert (episode.status == Status.APPLIED).all()
-
-
-def test_no_limit_is_met_off_the_path():
-    episode = played(beyond_reach(), "sns")
-    assert episode.position_error.max() > 0.02
-    assert not episode.at_limit.any()
-    assert {*episode.status} == {Status.APPLIED, Status.SATURATED}

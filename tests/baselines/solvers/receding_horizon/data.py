@@ -1,28 +1,16 @@
 """Horizons for the tests of the kernels."""
 
 import numpy as np
-import pytest
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.horizon import HorizonModel, analytic_gradient
+from baselines.solvers.receding_horizon.horizon import analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
-from ikgym.validation import read_only
-
-HORIZONS = pytest.mark.parametrize(
-    ("kind", "horizon"), [("finite_difference", 3), ("finite_difference", 6), ("analytic", 4)]
-)
 
 
-def joint_weights(joints):
-    """Weights of the joints, all of them different."""
-    return read_only(np.linspace(1.0, 3.0, joints))
-
-
-def data_of(problem):
-    """Of a scenario or a problem, with weights of the joints."""
-    problem = Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit)
-    return HorizonModel(*problem.kernel_model, joint_weights(problem.model.joints))
+def data_of(scenario):
+    """What the kernels are told of a scenario, without its limits."""
+    return Problem(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit).kernel_model
 
 
 def horizon_cost(data, q, nominal, qdot):
@@ -33,6 +21,25 @@ def constraints(dt, stages, n):
     """A: c(i) = (q(i+1) - q(i))/Δt - q̇(i) by (q(2 … HL), q̇(1 … HL-1)); q(1) is no variable."""
     rise = (np.eye(stages) - np.eye(stages, k=-1)) / dt
     return np.kron(np.hstack([rise, -np.eye(stages)]), np.eye(n))
+
+
+def trapezoidal_weights(at):
+    """The trapezoidal rule written out: the error of each step lies between those of the knots around it."""
+    weights, before = np.zeros(len(at)), 0
+    for k, here in enumerate(at):
+        for step in range(before + 1, here + 1):
+            share = (step - before) / (here - before)
+            weights[k] += share
+            if k > 0:
+                weights[k - 1] += 1.0 - share
+        before = here
+    return weights
+
+
+def reduced_by_hand(a, full):
+    """Eq. 3-4: a gradient without its part across the constraints a, and their multipliers, by least squares."""
+    multipliers = np.linalg.lstsq(a.T, -full, rcond=None)[0]
+    return full + a.T @ multipliers, multipliers
 
 
 def problem(name, stages):

@@ -9,8 +9,8 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from ikgym.obstacles import Sphere
 from ikgym.obstacles.random_boxes import RandomBoxes
+from tests.bodied import ball_in_the_way
 
 SEED, STEPS = 3, 300
 
@@ -30,12 +30,7 @@ def elbow_obstacle():
     """A motion of the Panda, and a ball in the way of its elbow that the null space keeps clear of."""
     scenario = ikgym.scenarios.get("panda-random").replace(steps=STEPS)
     (free,) = rollouts(scenario, baselines.make("rhc_foresight", scenario), (SEED,))
-    before, after = (scenario.arm.joint_points(q)[3, 0] for q in (free.q[0], free.q[-1]))
-    ahead = (after - before) / np.linalg.norm(after - before)
-    for shift in np.linspace(0.2, 0.0, 401):
-        ball = Sphere("ball", after + shift * ahead, 0.05)
-        if scenario.arm.clearance(free.q, [ball])[0].min() < -2e-3:
-            break
+    ball = ball_in_the_way(scenario.arm, free.q)
     assert scenario.arm.clearance(free.q[0], [ball])[0] > 2e-3
     return scenario, ball, total(free)
 

@@ -1,5 +1,8 @@
 """Receding horizons under limits of acceleration: their optima are IPOPT's, and the plant holds nothing back."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,12 +10,16 @@ import baselines
 import ikgym
 from baselines.episodes import rollouts
 from benchmarks.rivals.numpy_horizon import beyond_limits, plan_cost
-from tests.baselines.solvers.receding_horizon.newton.states import DT, KNOTS, horizon_of, problem_of
-from tests.baselines.solvers.receding_horizon.newton.test_interior_point import GOLDEN
+from tests.baselines.solvers.receding_horizon.newton.states import DT, KNOTS, State, horizon_of, problem_of
 from tests.baselines.solvers.receding_horizon.test_rhc import observe
 from tests.limited import limited
 
 SEEDS = ikgym.scenarios.seeds("validation", 2)
+GOLDEN = [
+    (State(*map(np.array, (line["q"], line["qdot"], line["path"]))), line["cost"], line["at_limit"])
+    for line in json.loads((Path(__file__).parent / "newton/golden/horizons.json").read_text())
+]
+SOME = GOLDEN[8:13]
 
 
 def panda(steps=60, **changes):
@@ -28,9 +35,10 @@ def states(golden):
     return problem, horizons, observe(problem, q, nominal, qdot)
 
 
-def test_plans_are_ipopts_and_a_batch_is_its_rows():
-    """To convergence the plan is IPOPT's, and what is applied is its first velocity."""
-    golden = GOLDEN[8:13]
+@pytest.mark.parametrize("golden", [SOME, pytest.param(GOLDEN, marks=pytest.mark.slow)], ids=len)
+def test_plans_are_ipopts_and_a_batch_is_its_rows(golden):
+    """To convergence the plan is IPOPT's, at limits of all three kinds, and what is applied is its first velocity."""
+    assert (np.array([at_limit for *_, at_limit in golden]) > 0).any(axis=0).all()
     problem, horizons, observation = states(golden)
     policy = baselines.get("rhc")(problem, horizon=KNOTS + 1, tolerance=1e-8)
     action, state = policy.predict(observation)

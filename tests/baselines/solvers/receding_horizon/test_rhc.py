@@ -12,6 +12,7 @@ from baselines.episodes import rollout
 from baselines.status import Status
 from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
+from tests.baselines.solvers.receding_horizon.data import trapezoidal_weights
 from tests.comparison import identical
 
 VARGA = ["varga7-fast", "varga7-slow", "varga7-literal-fast", "varga7-literal-slow"]
@@ -33,19 +34,12 @@ def observe(problem, q, nominal, qdot=None, remaining=FAR):
 
 
 def grid_horizon(policy, q, nominal, left=FAR):
-    """What the policy minimises, its weights by the trapezoidal rule written out."""
+    """What the policy minimises."""
     end = min(int(policy.offsets[-1]), left)
     at = np.append(policy.offsets[policy.offsets < end], end)
-    weights, before = np.zeros(len(at)), 0
-    for k, here in enumerate(at):
-        share = (np.arange(before + 1, here + 1) - before) / (here - before)
-        weights[k] += share.sum()
-        if k > 0:
-            weights[k - 1] += (1.0 - share).sum()
-        before = here
+    weights = trapezoidal_weights(at)
     weights[-1] *= policy.terminal_weight
-    joints = np.broadcast_to(policy.joint_weights, q.shape) / np.min(policy.joint_weights)
-    return Horizon(q, nominal[at - 1], np.diff(at, prepend=0).astype(float), weights, joint_weights=joints)
+    return Horizon(q, nominal[at - 1], np.diff(at, prepend=0).astype(float), weights)
 
 
 def states_near(scenario, ahead, count, far, seed=0):
@@ -134,12 +128,7 @@ def test_other_arms_and_tasks(name, horizon, count):
 
 
 @pytest.mark.parametrize(
-    "parameters",
-    [
-        {"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0},
-        {"horizon": 9, "terminal_weight": 0.0},
-        {"horizon": 9, "joint_weights": (6.0, 3.0, *[300.0] * 4, 3.0)},
-    ],
+    "parameters", [{"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0}, {"horizon": 9, "terminal_weight": 0.0}]
 )
 def test_blocked_and_weighted_horizons(parameters):
     scenario = ikgym.scenarios.get("varga7-fast")
@@ -148,6 +137,30 @@ def test_blocked_and_weighted_horizons(parameters):
     costs, horizons, plans, state = planned(policy, q, nominal)
     assert set(policy.report(state).status) == {Status.CONVERGED}
     compare(policy, CasadiHorizon(policy.problem, len(policy.offsets)), costs, horizons, plans)
+
+
+def rate_cost(policy, horizon, plan):
+    """What the changes of velocity of a plan cost."""
+    speeds = np.diff(np.vstack([horizon.q, plan]), axis=0) / (horizon.lengths[:, None] * policy.problem.dt)
+    changes = np.diff(np.vstack([horizon.qdot, speeds]), axis=0)
+    spans = 0.5 * (horizon.lengths + np.append(1.0, horizon.lengths[:-1]))
+    return policy.rate_weight * np.sum(changes**2 / spans[:, None])
+
+
+@pytest.mark.parametrize("parameters", [{"horizon": 8}, {"horizon": 31, "move_blocks": 8}])
+def test_plans_whose_changes_of_velocity_cost_something_are_as_cheap_as_ipopts(parameters):
+    scenario = ikgym.scenarios.get("varga7-fast")
+    policy = baselines.make("rhc", scenario, rate_weight=5.0, **parameters)
+    q, nominal = states_near(scenario, policy.preview, 3, 1e-2)
+    qdot = np.random.default_rng(1).normal(size=q.shape)
+    costs, horizons, plans, _ = planned(policy, q, nominal, qdot=qdot)
+    solver = CasadiHorizon(policy.problem, len(policy.offsets), rate_weight=5.0)
+    for cost, horizon, plan, before in zip(costs, horizons, plans, qdot, strict=True):
+        moving = dataclasses.replace(horizon, qdot=before)
+        best = solver.solve(moving, plan)
+        assert best.converged
+        wanted = best.cost + rate_cost(policy, moving, best.q)
+        assert cost + rate_cost(policy, moving, plan) == pytest.approx(wanted, rel=1e-6)
 
 
 @pytest.mark.parametrize("blocks", [None, 6])

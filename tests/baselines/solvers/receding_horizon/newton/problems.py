@@ -11,7 +11,6 @@ from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from ikgym import TrackingCost
 from ikgym.validation import read_only
-from tests.baselines.solvers.receding_horizon.data import joint_weights
 
 #: No limit of accelerations. What a policy has read-only is so here: kernels are compiled once for both.
 UNLIMITED = read_only(np.zeros(0))
@@ -42,11 +41,11 @@ class Place:
     multipliers: np.ndarray
     error_size: int
     size: int
+    more: dict
 
     @property
     def problem(self):
-        weights = joint_weights(len(self.start))
-        return PathProblem(self.data, self.grid, self.start, self.nominal, weights, change_limit=UNLIMITED)
+        return PathProblem(self.data, self.grid, self.start, self.nominal, change_limit=UNLIMITED, **self.more)
 
     @property
     def workspace(self):
@@ -63,8 +62,10 @@ class Place:
         return answer, workspace.model
 
 
-def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, at=(1, 2, 4, 7), terminal=2.5) -> Place:
-    """A path of velocities of order 1 whose errors are of order Δx, from home or anywhere."""
+def place(
+    arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, at=(1, 2, 4, 7), terminal=2.5, **more
+) -> Place:
+    """A path of velocities of order 1 whose errors are of order Δx, from home or anywhere; more of the problem."""
     arm, task, rng = ikgym.arms.get(arm), ikgym.tasks.get(task), np.random.default_rng(seed)
     n, e, grid = arm.joints, task.error_size, grid_of(at, terminal=terminal)
     dt, knots = delta_x, len(at)  # so that errors and velocities weigh alike
@@ -85,4 +86,4 @@ def place(arm, task, *, seed=0, home=False, delta_x=1e-3, p_x=3.0, limits=True, 
         multipliers[:, e : e + n] *= 100.0
         multipliers[:, e + n :] *= 100.0 / dt
     data = model_tuple(arm, task, TrackingCost(delta_x=delta_x, p_x=p_x), dt, (lower, upper, speed))
-    return Place(data, grid, start, nominal, path, multipliers, e, task.size)
+    return Place(data, grid, start, nominal, path, multipliers, e, task.size, more)

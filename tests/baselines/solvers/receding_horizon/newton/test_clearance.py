@@ -1,5 +1,6 @@
 """Clearance as a limit of the interior point method: its derivatives, and its optima against IPOPT's."""
 
+import casadi
 import numpy as np
 import pytest
 
@@ -12,9 +13,18 @@ from baselines.solvers.receding_horizon.newton.clearance import is_clear, keep_c
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import newton_workspace
+from benchmarks.rivals import casadi_kinematics
+from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from ikgym.arms.bodies import Bodies
 from ikgym.obstacles import HalfSpace, Sphere
-from tests.baselines.solvers.receding_horizon.newton.states import DT, State, horizon_of, path_problem
+from tests.baselines.solvers.receding_horizon.newton.states import (
+    DT,
+    State,
+    horizon_of,
+    path_problem,
+    solved,
+)
+from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
 
 MARGIN = 1e-3
 AT = (1, 2, 4, 8, 15, 25)
@@ -75,20 +85,12 @@ def test_gradient_is_that_of_central_differences():
     assert value == pytest.approx(merit(here, path, barrier, workspace), rel=1e-12)
     assert value > linearise(here._replace(clearance=None), path, barrier, ANEW, False, workspace) + 1.0
     linearise(here, path, barrier, ANEW, False, workspace)
-    gradient = workspace.model.gradient.copy()
-    for k, j in np.ndindex(*path.shape):
-        low, high = path.copy(), path.copy()
-        low[k, j] -= 1e-7
-        high[k, j] += 1e-7
-        difference = (merit(here, high, barrier, workspace) - merit(here, low, barrier, workspace)) / 2e-7
-        assert gradient[k, j] == pytest.approx(difference, rel=1e-5, abs=1e-6 * abs(gradient).max())
+    gradient = workspace.model.gradient.ravel().copy()
+    central = differences(lambda x: merit(here, x, barrier, workspace), path, 1e-7)
+    np.testing.assert_allclose(gradient, central, rtol=1e-5, atol=1e-6 * abs(gradient).max())
 
 
 def test_optimum_among_bodies_is_ipopts():
-    casadi = pytest.importorskip("casadi", reason="pip install ikgym[rivals]")
-    from benchmarks.rivals import casadi_kinematics
-    from benchmarks.rivals.casadi_horizon import CasadiHorizon
-
     arm, state, (ball, floor) = obstructed()
     problem, horizon, here = posed(arm, state, (ball, floor))
 
@@ -107,13 +109,7 @@ def test_optimum_among_bodies_is_ipopts():
     best = Among(problem, len(AT), limited=True, braking=True).solve(horizon)
     path = np.tile(horizon.q, (len(AT), 1))
     minimum = minimise_limited(here, path, NewtonSettings(True, 300, 1e-8), 0.0, workspace_of(here, path))
-    free = minimise_limited(
-        here._replace(clearance=None),
-        path.copy(),
-        NewtonSettings(True, 300, 1e-8),
-        0.0,
-        workspace_of(here._replace(clearance=None), path),
-    )
+    free, _ = solved(problem, horizon)
     assert best.converged
     assert minimum.outcome == CONVERGED
     assert minimum.cost == pytest.approx(best.cost, rel=1e-6)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.solvers.receding_horizon.horizon import HorizonModel
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
@@ -95,17 +94,45 @@ def test_second_derivatives_of_the_error_alone(arm, task):
         np.testing.assert_allclose(symmetric(out), central, atol=2e-5 * max(abs(central).max(), 1.0))
 
 
-@every_task
-def test_derivatives_against_central_differences(arm, task):
-    at = busy(arm, task, home=ARMS.index(arm) % 2 == 0)
+def check_derivatives(at, step):
+    """Gradient and Hessian of the merit; what is left out at slow joints is the least curvature of Φ^U."""
     (value, _, _), blocks = at.linearise()
     assert value == pytest.approx(at.merit(), rel=1e-13)
-    step = 1e-5 * scale_of(task)
     central = differences(at.merit, at.path, step).reshape(blocks.gradient.shape)
     np.testing.assert_allclose(blocks.gradient, central, atol=1e-6 * abs(central).max())
     central = differences(lambda path: at.linearise(path)[1].gradient.ravel(), at.path, step)
-    # What is left out at slow joints is the least curvature of Φ^U.
-    np.testing.assert_allclose(dense(at.linearise()[1]), central, atol=1e-5 * abs(central).max())
+    rated = "rate_weight" in at.more
+    np.testing.assert_allclose(dense(at.linearise()[1], far=rated), central, atol=1e-5 * abs(central).max())
+
+
+@every_task
+def test_derivatives_against_central_differences(arm, task):
+    check_derivatives(busy(arm, task, home=ARMS.index(arm) % 2 == 0), 1e-5 * scale_of(task))
+
+
+@pytest.mark.parametrize("at", [(1,), (1, 2), (1, 2, 4, 7, 12)])
+def test_derivatives_where_changes_of_velocity_cost_something(at):
+    before = np.linspace(-1.0, 1.0, 7)
+    check_derivatives(place("varga7", "skew", at=at, qdot_before=before, rate_weight=0.3), 1e-8)
+
+
+def payload(first, knots=4):
+    """From one of the knots on, in [rad]."""
+    return np.where(np.arange(knots)[:, None] >= first, np.linspace(1e-3, 2e-3, 7), 0.0)
+
+
+def test_a_payload_from_the_start_is_an_arm_that_stands_elsewhere():
+    at, shift = place("panda", "pose", limits=False), payload(0)[0]
+    elsewhere = at.problem._replace(start=at.start + shift)
+    loaded = true_cost(at.problem._replace(load=payload(0)), at.path, at.workspace)
+    assert loaded == pytest.approx(true_cost(elsewhere, at.path + shift, at.workspace), rel=1e-9)
+    assert loaded != pytest.approx(true_cost(at.problem, at.path, at.workspace), rel=1e-3)
+
+
+def test_the_gradient_with_a_payload_on_the_way():
+    at = place("panda", "pose", delta_x=1e-4, load=payload(2))
+    central = differences(at.merit, at.path, 1e-8)
+    np.testing.assert_allclose(at.linearise()[1].gradient.ravel(), central, atol=1e-4 * abs(central).max())
 
 
 @pytest.mark.parametrize("p_x", [1.5, 2.0, 3.5])
@@ -125,8 +152,7 @@ def test_other_exponents(p_x):
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
     qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
-    data = HorizonModel(*at.data, at.problem.joint_weights)
-    kernels = horizon_cost(data, at.start, at.nominal, qdot)
+    kernels = horizon_cost(at.data, at.start, at.nominal, qdot)
     mine = true_cost(at.problem, at.path, at.workspace)
     assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
     assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)

@@ -11,6 +11,7 @@ from baselines.solvers.receding_horizon.newton.grid import (
     shift_multipliers,
     shift_path,
 )
+from tests.baselines.solvers.receding_horizon.data import trapezoidal_weights
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
 
 horizons = st.integers(1, 3000).flatmap(lambda steps: st.tuples(st.just(steps), st.integers(1, steps)))
@@ -46,19 +47,6 @@ def test_evenly_growing_offsets_by_hand():
     assert evenly_growing_offsets(5, 0.0, 6.0).tolist() == [1, 2, 3, 4, 5]
 
 
-def by_hand(at):
-    """The trapezoidal rule written out: the error of each step lies between those of the knots around it."""
-    weights, before = np.zeros(len(at)), 0
-    for k, here in enumerate(at):
-        for step in range(before + 1, here + 1):
-            share = (step - before) / (here - before)
-            weights[k] += share
-            if k > 0:
-                weights[k - 1] += 1.0 - share
-        before = here
-    return weights
-
-
 @settings(max_examples=40)
 @given(horizons, st.integers(1, 4000), st.sampled_from([0.0, 1.0, 2.5]))
 def test_cut(horizon, left, terminal):
@@ -68,7 +56,7 @@ def test_cut(horizon, left, terminal):
     assert grid.at.tolist() == [*whole[whole < end], end]
     np.testing.assert_array_equal(grid.length, np.diff(grid.at, prepend=0))
     np.testing.assert_array_equal(grid.velocity, grid.length)
-    wanted = by_hand(grid.at)
+    wanted = trapezoidal_weights(grid.at)
     if left >= horizon[0]:  # the end of an episode is none of the horizon's
         wanted[-1] *= terminal
     np.testing.assert_allclose(grid.tracking, wanted, rtol=1e-9)

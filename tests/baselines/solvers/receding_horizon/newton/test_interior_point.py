@@ -1,69 +1,26 @@
-"""Minima within limits of acceleration: against those that IPOPT finds, and by hand."""
-
-import dataclasses
-import json
-from pathlib import Path
+"""Minima within limits of acceleration: between uneven knots against IPOPT's, and by hand; see test_limits, too."""
 
 import numpy as np
 import pytest
 
 import ikgym
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, STALLED
-from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits, plan_cost
+from benchmarks.rivals.casadi_horizon import CasadiHorizon
+from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits
 from tests.baselines.solvers.receding_horizon.newton.states import (
-    State,
     draw,
     horizon_of,
     problem_of,
     solved,
 )
 
-GOLDEN = [
-    (State(*map(np.array, (line["q"], line["qdot"], line["path"]))), line["cost"], line["at_limit"])
-    for line in json.loads((Path(__file__).parent / "golden/horizons.json").read_text())
-]
-
-
-def check(states):
-    """The horizon's optimum is IPOPT's to 1e-6, and keeps all limits, with braking behind its end."""
-    problem = problem_of()
-    for state, cost, _ in states:
-        horizon = horizon_of(problem, state)
-        minimum, path = solved(problem, horizon)
-        assert minimum.outcome == CONVERGED
-        assert minimum.cost == pytest.approx(cost, rel=1e-6)
-        assert minimum.cost == pytest.approx(plan_cost(problem, horizon, path), rel=1e-9)
-        assert max(beyond_limits(problem, horizon, path, braking=True).values()) < 1e-9
-
-
-def test_optimum_is_ipopts():
-    check(GOLDEN[8:13])
-
-
-@pytest.mark.slow
-def test_optimum_is_ipopts_on_50_states():
-    assert len(GOLDEN) == 50
-    check(GOLDEN)
-
-
-def test_golden_states_are_at_all_limits():
-    """A table of plans that no limit touches would show nothing."""
-    held = np.array([at_limit for *_, at_limit in GOLDEN])
-    assert (held[:, 2] >= 40).all()
-    assert (held > 0).sum(axis=0).tolist() >= [10, 2, 50]
-    assert (np.array([at_limit for *_, at_limit in GOLDEN[8:13]]) > 0).any(axis=0).all()
-
 
 @pytest.mark.parametrize(("at", "braking"), [((1,), True), ((2, 5), False), ((1, 2, 4, 8, 15, 25), True)])
 def test_optimum_between_uneven_knots_is_ipopts(at, braking):
-    pytest.importorskip("casadi", reason="pip install ikgym[rivals]")
-    from benchmarks.rivals.casadi_horizon import CasadiHorizon
-
     problem, rng = problem_of(), np.random.default_rng(len(at))
     solver = CasadiHorizon(problem, len(at), limited=True, braking=braking)
     for _ in range(2):
-        weights = np.linspace(5.0, 1.0, 7)
-        horizon = dataclasses.replace(horizon_of(problem, draw(rng), at=at), joint_weights=weights)
+        horizon = horizon_of(problem, draw(rng), at=at)
         best = solver.solve(horizon)
         minimum, path = solved(problem, horizon, braking=braking)
         assert best.converged
