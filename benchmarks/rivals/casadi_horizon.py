@@ -74,18 +74,18 @@ class CasadiHorizon:
 
     @functools.cached_property
     def solver(self) -> Any:
-        """The compiled problem, made once: variables y, t; parameters q_0, the nominal coordinates, h, w, q̇ before."""
+        """The compiled problem, made once: variables y, t; parameters q_0, nominal, h, w, q̇ before, joint weights."""
         problem, knots = self.problem, self.knots
         n, m, e = problem.model.joints, problem.task.size, problem.task.error_size
         y, t = casadi.SX.sym("y", n, knots), casadi.SX.sym("t", e, knots)
         start, nominal = casadi.SX.sym("q", n), casadi.SX.sym("nominal", m, knots)
         h, w, before = casadi.SX.sym("h", knots), casadi.SX.sym("w", knots), casadi.SX.sym("qdot", n)
-        error = residual(problem)
+        weights, error = casadi.SX.sym("weights", n), residual(problem)
         cost, power = casadi.SX(0), int(problem.cost.p_x)
         above, last, length = [], before, casadi.SX(1)
         for k in range(knots):
             qdot = (y[:, k] - (y[:, k - 1] if k else 0.0)) / h[k]
-            cost += h[k] * casadi.sum1((qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
+            cost += h[k] * casadi.dot(weights, (qdot / problem.cost.delta_qdot) ** int(problem.cost.p_in))
             cost += w[k] * casadi.sum1(t[:, k])
             cost += self.rate_weight * casadi.sumsqr(qdot - last) / (0.5 * (length + h[k]))
             last, length = qdot, h[k]
@@ -97,7 +97,7 @@ class CasadiHorizon:
             above += self._room(start, y, h, before)
         nlp = {
             "x": casadi.vertcat(casadi.vec(y), casadi.vec(t)),
-            "p": casadi.vertcat(start, casadi.vec(nominal), h, w, before),
+            "p": casadi.vertcat(start, casadi.vec(nominal), h, w, before, weights),
             "f": cost,
             "g": casadi.vertcat(*above),
         }
@@ -128,7 +128,10 @@ class CasadiHorizon:
         answer = self.solver(
             x0=np.concatenate([y.ravel(), t.T.ravel()]),
             p=np.concatenate(
-                [horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights, horizon.qdot_before]
+                [
+                    *(horizon.q, horizon.nominal.ravel(), horizon.lengths, horizon.tracking_weights),
+                    *(horizon.qdot_before, horizon.velocity_weights),
+                ]
             ),
             lbg=0.0,
             ubg=np.inf,

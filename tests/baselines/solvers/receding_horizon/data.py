@@ -4,13 +4,20 @@ import numpy as np
 
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.receding_horizon.horizon import analytic_gradient
+from baselines.solvers.receding_horizon.horizon import HorizonModel, analytic_gradient
 from baselines.solvers.receding_horizon.task_constraints import Unknowns, kinematic_errors, task_system
+from ikgym.validation import read_only
 
 
-def data_of(scenario):
-    """What the kernels are told of a scenario, without its limits."""
-    return Problem(scenario.model, scenario.task, scenario.cost, scenario.dt, scenario.velocity_limit).kernel_model
+def joint_weights(joints):
+    """Weights of the joints, all of them different."""
+    return read_only(np.linspace(1.0, 3.0, joints))
+
+
+def data_of(problem):
+    """Of a scenario or a problem, with weights of the joints."""
+    problem = Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit)
+    return HorizonModel(*problem.kernel_model, joint_weights(problem.model.joints))
 
 
 def horizon_cost(data, q, nominal, qdot):

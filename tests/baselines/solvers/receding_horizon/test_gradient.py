@@ -9,17 +9,17 @@ import ikgym
 from baselines import episodes
 from baselines.solvers.receding_horizon.horizon import analytic_gradient, difference_gradient
 from baselines.status import Status
-from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost
+from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost, joint_weights
 from tests.every_scenario import ONE_OF_EACH
 
 
-def phi(scenario, q, nominal, qdot):
-    """Φ of the paper, section III, by the public parts of ikgym."""
+def phi(scenario, q, nominal, qdot, weights=1.0):
+    """Φ of the paper, section III, by the public parts of ikgym, with weights of the joints."""
     total = 0.0
     for velocity, target in zip(qdot, nominal, strict=True):
         q = q + scenario.dt * velocity
         error = scenario.task.error(target, scenario.task.coordinates(*scenario.model.forward(q)))
-        total += scenario.cost.tracking(error) + scenario.cost.velocity(velocity)
+        total += scenario.cost.tracking(error) + np.sum(weights * scenario.cost.velocity(velocity[:, None]))
     return total
 
 
@@ -76,7 +76,8 @@ def test_gradients_against_central_differences(name):
     analytic, forward = np.empty_like(qdot), np.empty_like(qdot)
     value = analytic_gradient(*common, qdot, analytic)
     assert value == difference_gradient(*common, qdot, 1e-7, forward)
-    assert value == pytest.approx(phi(scenario, q, nominal, qdot), rel=1e-9)
+    weights = joint_weights(scenario.joints)
+    assert value == pytest.approx(phi(scenario, q, nominal, qdot, weights), rel=1e-9)
     central = np.empty_like(qdot)
     for index in np.ndindex(qdot.shape):
         up, down = qdot.copy(), qdot.copy()

@@ -39,7 +39,8 @@ def grid_horizon(policy, q, nominal, left=FAR):
     at = np.append(policy.offsets[policy.offsets < end], end)
     weights = trapezoidal_weights(at)
     weights[-1] *= policy.terminal_weight
-    return Horizon(q, nominal[at - 1], np.diff(at, prepend=0).astype(float), weights)
+    joints = np.broadcast_to(policy.joint_weights, q.shape) / np.min(policy.joint_weights)
+    return Horizon(q, nominal[at - 1], np.diff(at, prepend=0).astype(float), weights, joint_weights=joints)
 
 
 def states_near(scenario, ahead, count, far, seed=0):
@@ -128,7 +129,12 @@ def test_other_arms_and_tasks(name, horizon, count):
 
 
 @pytest.mark.parametrize(
-    "parameters", [{"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0}, {"horizon": 9, "terminal_weight": 0.0}]
+    "parameters",
+    [
+        {"horizon": 31, "move_blocks": 8, "terminal_weight": 20.0},
+        {"horizon": 9, "terminal_weight": 0.0},
+        {"horizon": 9, "joint_weights": (6.0, 3.0, *[300.0] * 4, 3.0)},
+    ],
 )
 def test_blocked_and_weighted_horizons(parameters):
     scenario = ikgym.scenarios.get("varga7-fast")

@@ -11,6 +11,7 @@ from baselines.solvers.receding_horizon.newton.grid import Grid, cut, empty_grid
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
 from ikgym import TrackingCost
 from ikgym.validation import read_only
+from tests.baselines.solvers.receding_horizon.data import joint_weights
 
 #: No limit of accelerations. What a policy has read-only is so here: kernels are compiled once for both.
 UNLIMITED = read_only(np.zeros(0))
@@ -45,7 +46,8 @@ class Place:
 
     @property
     def problem(self):
-        return PathProblem(self.data, self.grid, self.start, self.nominal, change_limit=UNLIMITED, **self.more)
+        weights = joint_weights(len(self.start))
+        return PathProblem(self.data, self.grid, self.start, self.nominal, weights, change_limit=UNLIMITED, **self.more)
 
     @property
     def workspace(self):

@@ -72,7 +72,8 @@ def path_problem(problem: Problem, horizon: Horizon, braking=True) -> PathProble
     nominal = np.zeros((at[-1], problem.task.size))
     nominal[at - 1] = horizon.nominal
     q, before = np.array(horizon.q), np.array(horizon.qdot_before)
-    return PathProblem(problem.kernel_model, grid_of(at), q, nominal, before, 0.0, change, braking)
+    weights = read_only(horizon.velocity_weights)
+    return PathProblem(problem.kernel_model, grid_of(at), q, nominal, weights, before, 0.0, change, braking)
 
 
 def solved(problem: Problem, horizon: Horizon, path=None, braking=True, exact=True, steps=300, tolerance=1e-8):

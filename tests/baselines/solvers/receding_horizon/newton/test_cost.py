@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ikgym
+from baselines.solvers.receding_horizon.horizon import HorizonModel
 from baselines.solvers.receding_horizon.newton.cost import true_cost
 from baselines.solvers.receding_horizon.newton.second_order import second_order
 from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
@@ -152,7 +153,8 @@ def test_other_exponents(p_x):
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
     qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
-    kernels = horizon_cost(at.data, at.start, at.nominal, qdot)
+    data = HorizonModel(*at.data, at.problem.joint_weights)
+    kernels = horizon_cost(data, at.start, at.nominal, qdot)
     mine = true_cost(at.problem, at.path, at.workspace)
     assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
     assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)

@@ -1,5 +1,7 @@
 """Minima within limits of acceleration: between uneven knots against IPOPT's, and by hand; see test_limits, too."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,8 @@ def test_optimum_between_uneven_knots_is_ipopts(at, braking):
     problem, rng = problem_of(), np.random.default_rng(len(at))
     solver = CasadiHorizon(problem, len(at), limited=True, braking=braking)
     for _ in range(2):
-        horizon = horizon_of(problem, draw(rng), at=at)
+        weights = np.linspace(5.0, 1.0, 7)
+        horizon = dataclasses.replace(horizon_of(problem, draw(rng), at=at), joint_weights=weights)
         best = solver.solve(horizon)
         minimum, path = solved(problem, horizon, braking=braking)
         assert best.converged

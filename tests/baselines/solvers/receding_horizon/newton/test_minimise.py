@@ -13,6 +13,7 @@ from baselines.solvers.receding_horizon.newton.workspace import PathProblem, new
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.kernels import tasks as task_kernels
+from tests.baselines.solvers.receding_horizon.data import joint_weights
 from tests.baselines.solvers.receding_horizon.newton.problems import UNLIMITED, grid_of, model_tuple
 from tests.baselines.solvers.receding_horizon.newton.test_cost import dense
 
@@ -77,7 +78,7 @@ def slider(goals, weight=1.0, upper=np.inf, speed=np.inf, most=50, tolerance=1e-
     nominal[:, 0] = goals * S
     path, multipliers = np.zeros((len(goals), 1)), np.zeros((len(goals), 5))
     workspace = newton_workspace(task.kind, task.size, len(goals), 1)
-    problem = PathProblem(data, grid, np.zeros(1), nominal, change_limit=UNLIMITED)
+    problem = PathProblem(data, grid, np.zeros(1), nominal, joint_weights(1), change_limit=UNLIMITED)
     settings = NewtonSettings(True, most, tolerance)
     outcome, made, value, slope = minimise(problem, path, multipliers, settings, workspace)
     true = true_cost(problem, path, workspace)
