@@ -55,10 +55,10 @@ class Wrapper(SolverPolicy, abc.ABC):
         fresh = () if self.inner is None else self.inner.restarted(inside, rows)
         return *self.own_restarted(own, rows), *fresh
 
-    def recall(self, memory: Memory, qdot: FloatArray) -> Memory:
+    def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
         """See :meth:`SolverPolicy.recall`; the inner policy's command."""
         own, inside = self.split(memory)
-        return *own, *(() if self.inner is None else self.inner.recall(inside, qdot))
+        return *own, *(() if self.inner is None else self.inner.recall(inside, qdot, change))
 
     def own_restarted(self, own: Any, rows: npt.NDArray[np.bool_]) -> Memory:
         """The wrapper's memory, cleared where an episode begins."""

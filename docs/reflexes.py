@@ -8,6 +8,9 @@ run. Errors are those of the tool after the first second.
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import json
+import math
 
 import numpy as np
 
@@ -15,7 +18,7 @@ import ikgym
 from baselines import Controller
 from baselines.controller import MockArm
 from baselines.paths.retiming import retime
-from docs.keeping import Line, lines
+from docs.keeping import WORK, Line, lines
 from ikgym.plant import Plant
 from ikgym.validation import FloatArray
 
@@ -30,8 +33,8 @@ class Run:
 
     seconds: float
     stopped: str
-    largest: float
-    rms: float
+    largest: float = math.nan
+    rms: float = math.nan
 
 
 def scenario_of(arm: str, path: str) -> ikgym.Scenario:
@@ -50,18 +53,19 @@ def drive(scenario: ikgym.Scenario, seed: int, seconds: float, *, jerk: bool) ->
     arm = MockArm(scenario.replace(plant=plant, steps=steps), real_time=False, jitter=JITTER, lost=LOST, seed=seed)
     controller = Controller(scenario.replace(jerk_limit=None if jerk else np.inf))
     reference = reference_of(scenario, steps + controller.ahead + 1)
-    state, errors = arm.read(), []
+    ahead, state, visited = controller.ahead, arm.read(), []
     for k in range(steps):
-        arm.write(
-            controller.step(state.q, None, reference[k + 1 : k + 1 + controller.ahead], commanded=state.commanded)
-        )
+        report = {"commanded": state.commanded, "commanded_acceleration": state.commanded_acceleration}
+        arm.write(controller.step(state.q, None, reference[k + 1 : k + 1 + ahead], **report))
         state = arm.read()
+        visited.append(state.q)
         reason = state.reflex or controller.stopped
         if reason is not None:
-            return Run(k * scenario.dt, reason.name.lower(), *_errors(errors))
-        if k * scenario.dt >= FIRST:
-            errors.append(float(np.linalg.norm(scenario.arm.forward(state.q)[1] - reference[k + 1, -3:])))
-    return Run(seconds, "", *_errors(errors))
+            return Run(k * scenario.dt, reason.name.lower())
+    first = round(FIRST / scenario.dt)
+    positions = scenario.arm.forward(np.array(visited[first:]))[1]
+    errors = np.linalg.norm(positions - reference[first + 1 : steps + 1, -3:], axis=1)
+    return Run(seconds, "", float(errors.max()), float(np.sqrt(np.mean(errors**2))))
 
 
 def reference_of(scenario: ikgym.Scenario, points: int) -> FloatArray:
@@ -76,18 +80,26 @@ def reference_of(scenario: ikgym.Scenario, points: int) -> FloatArray:
     return rows[:points]
 
 
-def _errors(errors: list[float]) -> tuple[float, float]:
-    return (max(errors), float(np.sqrt(np.mean(np.square(errors))))) if errors else (np.nan, np.nan)
-
-
 def measured() -> list[Line]:
-    """The table, one line an arm, a path and whether jerk is limited, with as many runs as its lines say."""
-    return [_line(one) for one in lines("reflexes")]
+    """The table, one line an arm, a path and whether jerk is limited, with as many runs as its lines say.
+
+    Runs are made line by line in turn; those of a measurement that was killed are read from its file.
+    """
+    table, file = lines("reflexes"), WORK / "reflexes-runs" / "runs.jsonl"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.touch()
+    runs = {(line, seed): Run(**run) for line, seed, run in map(json.loads, file.read_text().splitlines())}
+    scenarios = [scenario_of(one["arm"], one["path"]) for one in table]
+    for seed, (line, one) in itertools.product(range(max(int(one["runs"]) for one in table)), enumerate(table)):
+        if seed < int(one["runs"]) and (line, seed) not in runs:
+            run = drive(scenarios[line], seed, float(one["seconds"]), jerk=one["jerk"] == "limited")
+            with file.open("a") as out:
+                out.write(json.dumps([line, seed, dataclasses.asdict(run)]) + "\n")
+            runs[line, seed] = run
+    return [_line(one, [runs[line, seed] for seed in range(int(one["runs"]))]) for line, one in enumerate(table)]
 
 
-def _line(one: Line) -> Line:
-    scenario, seconds, jerk = scenario_of(one["arm"], one["path"]), float(one["seconds"]), one["jerk"] == "limited"
-    runs = [drive(scenario, seed, seconds, jerk=jerk) for seed in range(int(one["runs"]))]
+def _line(one: Line, runs: list[Run]) -> Line:
     reasons = sorted({run.stopped for run in runs if run.stopped})
     whole = [run for run in runs if not run.stopped]
     errors = {

@@ -102,7 +102,7 @@ class Controller:
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         delay = LONGEST if self._given is None else math.ceil(np.max(self._given.delay))
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
-        self._shown = len(offsets(self.policy.preview))
+        self._shown, self._ahead = len(offsets(self.policy.preview)), furthest(self.policy.preview)
         self._joints, self._kind = problem.model.joints, problem.task.kind
         self.reset()
 
@@ -126,6 +126,7 @@ class Controller:
         pose_age: float = 0.0,
         obstacles: npt.ArrayLike | Sequence[Obstacle] | None = None,
         commanded: npt.ArrayLike | None = None,
+        commanded_acceleration: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """The joint velocities for the next control period.
 
@@ -147,24 +148,32 @@ class Controller:
                 interface reports them (libfranka: ``dq_d``): others than were sent where a message was lost. The limits
                 of acceleration and jerk start from them, those of the first command as well. Cut to the largest
                 velocities. The last command if left out. Shape (n,).
+            commanded_acceleration: By how much these differ from those of the period before, divided by Δt, in [rad/s²]
+                or [m/s²], where the interface reports it as well (libfranka: ``ddq_d``): the limits of jerk start from
+                it, also where calls were missed for some periods. Only with ``commanded``; if left out, the difference
+                to the command before. Shape (n,).
 
         Returns:
             Joint velocities in [rad/s] or [m/s], within the limits. Shape (n,).
 
         Raises:
-            InvalidInputError: Something has a wrong shape, the reference is too short, or obstacles are missing.
+            InvalidInputError: Something has a wrong shape, the reference is too short, or obstacles or commanded
+                velocities are missing.
         """
         measured = numbers("q", q, (self._joints,))
         taken = None if commanded is None else self._speed("commanded", commanded)
+        change = None if commanded_acceleration is None else self._reported_change(commanded_acceleration, taken)
         speed = (self._last.copy() if taken is None else taken) if qdot is None else self._speed("qdot", qdot)
         seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)
-        if taken is not None and not np.isfinite(taken).all():
-            speed = taken  # which the guards refuse
-        elif taken is not None:
-            self._moved = np.clip(self._moved + taken - self._last, -self._quickest, self._quickest)
-            self._last[:] = taken
+        if taken is not None:
+            made = self._moved + taken - self._last if change is None else change
+            if np.isfinite(taken + made).all():
+                self._moved = np.clip(made, -self._quickest, self._quickest)
+                self._last[:] = taken
+            else:
+                speed = taken + made  # which the guards refuse
         if self._stopped is None:
             reason = kernels.watch(
                 *(measured, speed, seen, ahead, *ages),
@@ -173,7 +182,8 @@ class Controller:
             if solids is not None and not np.isfinite(solids).all():
                 reason = kernels.NOT_FINITE
             if self._made == 0 and reason != kernels.NOT_FINITE:
-                self._last[:], self._moved[:] = speed if taken is None else taken, 0.0  # an arm in motion is taken over
+                self._last[:] = speed if taken is None else taken  # an arm in motion is taken over
+                self._moved[:] = 0.0 if change is None else self._moved
             if reason == 0:
                 return self._commanded(measured, speed, seen, nominal, ages, solids)
             self._stopped = StopReason(reason)
@@ -211,7 +221,7 @@ class Controller:
     @property
     def ahead(self) -> int:
         """Number of reference poses that the policy looks ahead."""
-        return furthest(self.policy.preview)
+        return self._ahead
 
     @property
     def report(self) -> Report:
@@ -229,6 +239,12 @@ class Controller:
         fastest = self._problem.largest_qdot
         speed: FloatArray = np.clip(numbers(name, qdot, (self._joints,)), -fastest, fastest)
         return speed
+
+    def _reported_change(self, acceleration: npt.ArrayLike, taken: FloatArray | None) -> FloatArray:
+        """The change of the commanded velocities in a period, from their acceleration. Shape (n,)."""
+        if taken is None:
+            raise InvalidInputError("commanded_acceleration: expected commanded velocities as well, got none.")
+        return self._problem.dt * numbers("commanded_acceleration", acceleration, (self._joints,))
 
     def _obstacles(self, obstacles: npt.ArrayLike | Sequence[Obstacle] | None) -> FloatArray | None:
         """Rows of the obstacles, where the policy is shown any. Shape (o, 16)."""
@@ -274,7 +290,8 @@ class Controller:
             batch = batch._replace(obstacles=obstacles[None])
         try:
             memory = self.policy.initial_memory(1) if self._state is None else read_memory(self._state)
-            action, self._state = self.policy.act(batch, self.policy.recall(memory, self._last[None].copy()))
+            made = self._last[None].copy(), self._moved[None].copy()
+            action, self._state = self.policy.act(batch, self.policy.recall(memory, *made))
         except Exception:
             logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)
             self._stopped = StopReason.POLICY
@@ -284,8 +301,8 @@ class Controller:
             return self._braked()
         self._made += 1
         out = np.empty_like(q)
-        made = self._last, self._moved
-        kernels.command(self._limits, q, action[0], self._unit, *made, self._problem.dt, self._kept, out)
+        before = self._last, self._moved
+        kernels.command(self._limits, q, action[0], self._unit, *before, self._problem.dt, self._kept, out)
         return out
 
     def _braked(self) -> FloatArray:

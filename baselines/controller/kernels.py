@@ -131,6 +131,35 @@ def brake(most, steps, last, change, out):
 
 
 @kernel
+def refused(bounds, stops, wanted, command, change, q, qdot, dt):
+    """The limit that a command breaks, see :data:`baselines.controller.mock_arm.REFLEXES`; 0 if none.
+
+    Args:
+        bounds: The largest velocities, changes of them in a period, and changes of these. Shape (3, n).
+        stops: The stops in [rad] or [m], and the largest accelerations. Shape (3, n).
+        wanted: The commanded joint velocities in [rad/s] or [m/s]. Shape (n,).
+        command: Those before. Shape (n,).
+        change: By how much these differed from those before. Shape (n,).
+        q: True joint coordinates in [rad] or [m]. Shape (n,).
+        qdot: Joint velocities in [rad/s] or [m/s]. Shape (n,).
+        dt: Δt in [s].
+    """
+    if not np.isfinite(wanted).all():
+        return 1
+    for i in range(3):
+        for j in range(wanted.shape[0]):
+            step = wanted[j] - command[j]
+            value = wanted[j] if i == 0 else step if i == 1 else step - change[j]
+            if abs(value) > bounds[i, j]:
+                return 2 + i
+    for j in range(wanted.shape[0]):
+        room = stops[UPPER, j] - q[j] if qdot[j] > 0.0 else q[j] - stops[LOWER, j]
+        if 0.5 * qdot[j] ** 2 / stops[2, j] - dt * abs(qdot[j]) > max(room, 0.0):
+            return 5
+    return 0
+
+
+@kernel
 def convert(kind, rotations, positions, out):
     """Task coordinates of poses.
 

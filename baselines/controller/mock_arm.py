@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import multiprocessing
 import time
@@ -11,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from baselines.controller import kernels
 from baselines.controller.reference import numbers
+from baselines.controller.timing import use_real_time_priority
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import Outcome
@@ -23,6 +26,8 @@ from ikgym.validation import FloatArray, number, whole_number
 MOST_LOST, DEADLINE = 20, 0.3
 #: Commands may exceed their limits by this share, and by a rounding in [rad/s] or [m/s].
 SLACK, ROUNDING = 1e-3, 1e-9
+#: Most periods of an arm: 1,000 s at 1 kHz.
+MOST_PERIODS = 1_000_000
 
 
 class Reflex(enum.StrEnum):
@@ -36,6 +41,10 @@ class Reflex(enum.StrEnum):
     NOT_FINITE = "a command is not finite"
 
 
+#: Reflexes in the order of :func:`baselines.controller.kernels.refused`.
+REFLEXES = None, Reflex.NOT_FINITE, Reflex.VELOCITY, Reflex.ACCELERATION, Reflex.JERK, Reflex.POSITION
+
+
 class State(NamedTuple):
     """What the arm reports in each period.
 
@@ -44,12 +53,15 @@ class State(NamedTuple):
         q: Measured joint coordinates in [rad] or [m]. Shape (n,).
         commanded: The joint velocities that it has taken for the last command, in [rad/s] or [m/s]: where a message was
             lost, the velocity before, changed as in the period before. Shape (n,).
+        commanded_acceleration: By how much these differ from those before, divided by the period, in [rad/s²] or
+            [m/s²]. Shape (n,).
         reflex: Why the arm has stopped itself; None if it has not.
     """
 
     time: float
     q: FloatArray
     commanded: FloatArray
+    commanded_acceleration: FloatArray
     reflex: Reflex | None
 
 
@@ -73,15 +85,18 @@ class ArmInterface:
         self._lost = number("lost", lost, at_least=0.0, at_most=1.0)
         seed = whole_number("seed", seed, at_least=0)
         self._rng = np.random.default_rng([seed, 1])
-        self._simulator = Simulator(self.scenario.replace(collisions=False, obstacles=()), None, 1)
+        endless = {"steps": MOST_PERIODS, "iterations_per_point": MOST_PERIODS}  # the reference is not used
+        self._simulator = Simulator(self.scenario.replace(collisions=False, obstacles=(), **endless), None, 1)
         drawn = [seeding.np_random(seed)[0]]
         self._out: Outcome = self._reset(drawn)
         n, arm, dt = self.scenario.joints, self.scenario.arm, self.scenario.dt
         self._command, self._change = np.zeros(n), np.zeros(n)
         self._periods, self._missed = 0, 0
         self._reflex: Reflex | None = None
-        self._bounds = np.array([arm.velocity_limit, dt * arm.acceleration_limit, dt * dt * arm.jerk_limit])
+        self._braking = np.array([dt * arm.acceleration_limit, dt * dt * arm.jerk_limit])
+        self._bounds = np.array([arm.velocity_limit, *self._braking])
         self._bounds = (1.0 + SLACK) * self._bounds + ROUNDING
+        self._stops = np.array([arm.lower, arm.upper, arm.acceleration_limit])
 
     def _reset(self, generators: list[np.random.Generator]) -> Outcome:
         self._simulator.reset(np.ones(1, dtype=np.bool_), generators)
@@ -90,8 +105,8 @@ class ArmInterface:
     @property
     def state(self) -> State:
         """The state at the end of the last period."""
-        time_made = self._periods * self.scenario.dt
-        return State(time_made, self._out.q[0].copy(), self._command.copy(), self._reflex)
+        dt = self.scenario.dt
+        return State(self._periods * dt, self._out.q[0].copy(), self._command.copy(), self._change / dt, self._reflex)
 
     @property
     def true_q(self) -> FloatArray:
@@ -124,6 +139,17 @@ class ArmInterface:
         if self._reflex is not None:  # brakes as hard as it can
             most = np.minimum(self._bounds[1], np.abs(self._command))
             wanted = self._command - np.copysign(most, self._command)
+        return self._move(wanted)
+
+    def brake(self) -> State:
+        """One period of a stop within the limits of acceleration and jerk."""
+        wanted = np.empty_like(self._command)
+        kernels.brake(*self._braking, self._command.copy(), self._change.copy(), wanted)
+        return self._move(wanted)
+
+    def _move(self, wanted: FloatArray) -> State:
+        if self._periods >= MOST_PERIODS:
+            raise InvalidInputError(f"expected at most {MOST_PERIODS:,} periods of a mock arm.")
         self._change, self._command = wanted - self._command, wanted
         self._out = self._simulator.step(wanted / self.scenario.velocity_limit)
         self._periods += 1
@@ -131,21 +157,10 @@ class ArmInterface:
 
     def _refused(self, wanted: FloatArray) -> Reflex | None:
         """The reflex that a command starts; None if it is fine."""
-        if not np.isfinite(wanted).all():
-            return Reflex.NOT_FINITE
         if self._missed > MOST_LOST:
             return Reflex.COMMUNICATION
-        change = wanted - self._command
-        kinds = (Reflex.VELOCITY, wanted), (Reflex.ACCELERATION, change), (Reflex.JERK, change - self._change)
-        for bound, (reflex, value) in zip(self._bounds, kinds, strict=True):
-            if (np.abs(value) > bound).any():
-                return reflex
-        arm, dt, q = self.scenario.arm, self.scenario.dt, self.true_q
-        speed = self._out.qdot[0]
-        room = np.where(speed > 0.0, arm.upper - q, q - arm.lower)
-        with np.errstate(invalid="ignore"):
-            way = np.where(np.isfinite(arm.acceleration_limit), 0.5 * speed**2 / arm.acceleration_limit, 0.0)
-        return Reflex.POSITION if (way - dt * np.abs(speed) > np.maximum(room, 0.0)).any() else None
+        before, state, dt = (self._command, self._change), (self.true_q, self._out.qdot[0]), self.scenario.dt
+        return REFLEXES[kernels.refused(self._bounds, self._stops, wanted, *before, *state, dt)]
 
 
 class MockArm:
@@ -167,7 +182,7 @@ class MockArm:
 
     def __init__(self, scenario: str | Scenario, *, real_time: bool = True, **options: Any) -> None:
         self._interface = ArmInterface(scenario, **options)
-        self._joints, self._begun = self._interface.scenario.joints, False
+        self._joints, self._begun, self._on = self._interface.scenario.joints, False, True
         self._command: FloatArray | None = None
         self._pipe: Any = None
         self._process: Any = None
@@ -192,6 +207,7 @@ class MockArm:
         Raises:
             InvalidInputError: The arm was switched off.
         """
+        self._check("read")
         if self._process is None:
             begun, self._begun = self._begun, True
             command, self._command = self._command, None
@@ -201,7 +217,8 @@ class MockArm:
             while self._pipe.poll():
                 state = self._pipe.recv()
         except (EOFError, OSError):
-            raise InvalidInputError("read: expected an arm that is switched on.") from None
+            self._on = False
+            self._check("read")
         self._read_at = state.time
         return state
 
@@ -212,20 +229,42 @@ class MockArm:
             InvalidInputError: The shape is another one, or the arm was switched off.
         """
         command = numbers("qdot", qdot, (self._joints,))
+        self._check("write")
         if self._process is None:
             self._command = command.copy()
             return
         try:
             self._pipe.send((self._read_at, command))
         except OSError:
-            raise InvalidInputError("write: expected an arm that is switched on.") from None
+            self._on = False
+            self._check("write")
 
-    def stop(self) -> None:
-        """Switches the arm off."""
+    def stop(self) -> State | None:
+        """Brings the arm to rest within the limits of acceleration and jerk, and switches it off.
+
+        Returns:
+            The last state; None if the arm is off already.
+        """
+        state: State | None = None
+        if self._on and self._process is None:
+            state = self._interface.state
+            while state.commanded.any():
+                state = self._interface.brake()
+        elif self._on:
+            with contextlib.suppress(EOFError, OSError):
+                self._pipe.send((self._read_at, None))
+                while self._pipe.poll(5.0):
+                    state = self._pipe.recv()
+        self._on = False
         if self._process is not None:
             self._pipe.close()
             self._process.join(5.0)
             self._process.kill()
+        return state
+
+    def _check(self, name: str) -> None:
+        if not self._on:
+            raise InvalidInputError(f"{name}: expected an arm that is switched on.")
 
 
 def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
@@ -233,11 +272,12 @@ def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
     arm = ArmInterface(scenario, **options)
     arm.cycle(np.zeros(scenario.joints))  # compiles
     arm, period = ArmInterface(scenario, **options), scenario.dt
-    state, begun = arm.state, False
+    state, begun, stopping = arm.state, False, False
+    use_real_time_priority()
     try:
         pipe.send(state)
         due = time.perf_counter()
-        while True:
+        while not stopping or state.commanded.any():
             if not begun:  # the pipe is full while nobody reads
                 due = time.perf_counter()
             due += period
@@ -245,9 +285,11 @@ def _run(pipe: Any, scenario: Scenario, options: dict[str, Any]) -> None:
             while (left := due - time.perf_counter()) > 0.0 or pipe.poll():
                 if pipe.poll(max(left, 0.0)):
                     stamp, message = pipe.recv()
-                    if stamp == arm.state.time or not begun:  # one that was made for an earlier state is late
+                    stopping = stopping or message is None
+                    if stamp == state.time or not begun:  # one that was made for an earlier state is late
                         command = message
             begun = begun or command is not None  # nobody is late before the first command
-            pipe.send(arm.cycle(command if begun else np.zeros(scenario.joints)))
+            state = arm.brake() if stopping else arm.cycle(command if begun else np.zeros(scenario.joints))
+            pipe.send(state)
     except (EOFError, OSError):
         return

@@ -152,19 +152,21 @@ class SolverPolicy(Frozen, abc.ABC):
         width = self.problem.model.joints * (2 if self.remembers_change else 1)
         return (*memory, np.full((rows, width), np.nan)) if self.remembers_command else memory
 
-    def recall(self, memory: Memory, qdot: FloatArray) -> Memory:
+    def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
         """A memory with another last command: for wrappers and control loops, which know what was sent.
 
         Args:
             memory: As :meth:`initial_memory` or the last call gave it.
             qdot: In [rad/s] or [m/s]. Shape (B, n).
+            change: By how much it differed from the command before; if left out, that follows from the memory.
         """
         if not self.remembers_command:
             return memory
         *most, last = memory
         if self.remembers_change:
             n = qdot.shape[1]
-            qdot = np.concatenate([qdot, last[:, n:] + (qdot - last[:, :n])], axis=1)
+            made = last[:, n:] + (qdot - last[:, :n]) if change is None else change
+            qdot = np.concatenate([qdot, made], axis=1)
         return (*most, qdot)
 
     @abc.abstractmethod

@@ -115,7 +115,7 @@ class Predicted(NamedWrapper):
         slower = model.replace(velocity_limit=left * model.velocity_limit)
         return self.problem.replace(model=slower, velocity_limit=left * self.problem.velocity_limit)
 
-    @property
+    @functools.cached_property
     def preview(self) -> int:
         """That of the base policy, and the longest delay on top."""
         lead = self.longest_delay if self.identify else longest_lead(self._hypotheses.delay)
@@ -131,7 +131,8 @@ class Predicted(NamedWrapper):
         kept = PredictedMemory(*[array.copy() for array in own])
         off = self._observe(batch, kept)
         shown = self._shown(batch, kept)
-        step = self.ask(shown, self.inner.recall(inside, shown.qdot))
+        model_change = kept.arm_qdot[:, 0] - kept.arm_qdot[:, 1]
+        step = self.ask(shown, self.inner.recall(inside, shown.qdot, model_change))
         qdot = np.empty_like(batch.q)
         limits, servo = self._limits
         move_rows(limits, self.problem.dt, step.qdot, kept.arm_q, kept.arm_qdot)

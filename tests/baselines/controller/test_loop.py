@@ -113,11 +113,18 @@ def test_a_report_that_is_refused_changes_nothing():
         loops[0].step(q, None, nominal[:1, :3], commanded=np.full(7, 0.1))
     with pytest.raises(InvalidInputError, match=r"commanded: expected shape \(7,\)"):
         loops[0].step(q, None, nominal[: loops[0].ahead], commanded=[0.1])
+    with pytest.raises(InvalidInputError, match="commanded_acceleration: expected commanded velocities as well"):
+        loops[0].step(q, None, nominal[: loops[0].ahead], commanded_acceleration=np.zeros(7))
+    with pytest.raises(InvalidInputError, match=r"commanded_acceleration: expected shape \(7,\)"):
+        loops[0].step(q, None, nominal[: loops[0].ahead], commanded=np.zeros(7), commanded_acceleration=[0.1])
     first, second = (loop.step(q, None, nominal[: loop.ahead]) for loop in loops)
     np.testing.assert_array_equal(first, second)
     stop = loops[0].step(q, None, nominal[: loops[0].ahead], commanded=np.full(7, np.nan))
     assert loops[0].stopped is StopReason.NOT_FINITE
     assert np.isfinite(stop).all()
+    report = {"commanded": np.zeros(7), "commanded_acceleration": np.full(7, np.inf)}
+    assert np.isfinite(loops[1].step(q, None, nominal[: loops[1].ahead], **report)).all()
+    assert loops[1].stopped is StopReason.NOT_FINITE
 
 
 @pytest.mark.slow

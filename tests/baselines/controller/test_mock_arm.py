@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ikgym
-from baselines.controller import ArmInterface, Controller, MockArm, Reflex
+from baselines.controller import ArmInterface, Controller, Drives, MockArm, Reflex
 from docs.reflexes import drive, scenario_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
@@ -134,6 +134,56 @@ def test_the_loop_starts_from_what_the_arm_has_taken_where_messages_are_lost():
             arm.write(controller.step(state.q, None, ahead, commanded=commanded))
             state = arm.read()
         assert state.reflex is None if reported else state.reflex is not None
+
+
+@pytest.mark.parametrize("drives", ["identify", Drives()])
+@pytest.mark.parametrize("reported", [True, False])
+def test_periods_without_a_call_start_no_reflex_of_jerk_where_the_acceleration_is_reported(drives, reported):
+    """The arm goes on with its last acceleration, which the loop does not know from the velocities that it sees."""
+    scenario, rng = SCENARIO.replace(jerk_limit=None, steps=1000), np.random.default_rng(1)
+    arm = ArmInterface(
+        scenario.replace(plant=Plant(bandwidth=8.0, command_delay=2) if drives == "identify" else Plant())
+    )
+    controller, state = Controller(scenario, drives=drives), arm.state
+    reference = scenario.nominal(preview=controller.ahead)
+    for k in range(scenario.steps):
+        report = {"commanded": state.commanded, "commanded_acceleration": state.commanded_acceleration}
+        if not reported:
+            del report["commanded_acceleration"]
+        command = controller.step(state.q, None, reference[k + 1 : k + 1 + controller.ahead], **report)
+        for message in [command] if rng.random() > 0.02 else [None] * int(rng.integers(2, 10)):
+            state = arm.cycle(message)
+        if state.reflex is not None:
+            break
+    assert state.reflex is (None if reported else Reflex.JERK)
+    assert controller.stopped is None
+
+
+def test_a_stop_keeps_the_limits_of_acceleration_and_jerk():
+    arm = ArmInterface(SCENARIO)
+    velocity = first_joint(0.8 * np.append(ramp(0.9 * JERK, 2), ramp(0.9 * JERK, 2)[-1] + 0.7 * ACCELERATION * DT))
+    states = [arm.cycle(command) for command in velocity] + [arm.brake() for _ in range(30)]
+    acceleration = np.array([state.commanded_acceleration[0] for state in states])
+    assert states[len(velocity) - 1].commanded[0] > 0.01
+    assert (states[-1].commanded == 0.0).all()
+    assert np.abs(acceleration).max() <= ACCELERATION
+    assert np.abs(np.diff(acceleration, prepend=0.0)).max() <= (1.0 + 1e-9) * DT * JERK
+
+
+@pytest.mark.parametrize("real_time", [False, True])
+def test_stop_brings_the_arm_to_rest_and_switches_it_off(real_time):
+    scenario = SCENARIO.replace(dt=0.02, steps=5)
+    with MockArm(scenario, real_time=real_time) as arm:
+        for speed in (0.0, 0.1, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3):  # longer than the steps of the scenario
+            arm.read()
+            arm.write(np.full(7, speed))
+        last = arm.stop()
+        assert last.time >= 0.1
+        assert (last.commanded == 0.0).all()
+        assert last.reflex is None
+        assert arm.stop() is None
+    with pytest.raises(InvalidInputError, match="write: expected an arm that is switched on"):
+        arm.write(np.zeros(7))
 
 
 def test_a_process_keeps_its_period():
