@@ -69,8 +69,9 @@ docs: results/demo/report.html ## Build the documentation as a site in results/s
 results/demo/report.html: | $(CORE)
 	$(MAKE) --no-print-directory demo
 
-bench: $(STAMP) ## Measure speed beside other environments, libraries and solvers: report in results/bench
-	$(BIN)/python -m benchmarks
+bench: $(STAMP) ## Measure the tables of docs/bench.md: speed next to other environments, libraries and solvers
+	$(BIN)/python -m docs.measure environments calls kinematics inverse
+	$(BIN)/python -m docs.tables
 
 rivals: $(STAMP) ## Install the solvers and environments that bench compares with
 	$(PIP) ".[rivals]"

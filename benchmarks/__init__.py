@@ -1,1 +1,1 @@
-"""Speed, measured beside other environments and libraries in the same run: ``make bench``."""
+"""Learners in the environments by id, and the yardsticks that score them."""

@@ -75,11 +75,22 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def measured(name: str, *words: str) -> str:
-    """The table of a CSV file: `columns=NAME,NAME` chooses columns, `NAME=VALUE|VALUE` lines with such a value."""
+    """The table of a CSV file.
+
+    `columns=NAME,NAME` chooses columns, `NAME=VALUE|VALUE` lines with such a value. With `across=NAME cells=NAME` each
+    value of a column becomes a column.
+    """
     wanted = dict(word.split("=", 1) for word in words)
-    columns = wanted.pop("columns", "").split(",")
+    columns = [column for column in wanted.pop("columns", "").split(",") if column]
+    across, cells = wanted.pop("across", ""), wanted.pop("cells", "")
     kept = [line for line in lines(name) if all(line[key] in values.split("|") for key, values in wanted.items())]
-    return results_table(kept, [column for column in columns if column])
+    if across:
+        rows: dict[tuple[str, ...], dict[str, str]] = {}
+        for line in kept:
+            rows.setdefault(tuple(line[column] for column in columns), dict(line))[line[across]] = line[cells]
+        columns += dict.fromkeys(line[across] for line in kept)
+        kept = [dict.fromkeys(columns) | row for row in rows.values()]
+    return results_table(kept, columns)
 
 
 def table(words: str) -> str:

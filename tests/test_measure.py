@@ -9,7 +9,7 @@ from baselines.registry import parse_policy
 from baselines.tuning.ranges import RANGES, read_ranges
 from docs import keeping, measure
 
-POSE = [one for one in keeping.lines("pose") if one["scenario"] == "varga7-pose-random"]
+POSE = [one for one in keeping.lines("cost_time") if one["scenario"] == "varga7-pose-random"]
 #: Solvers of short sight that have settings to be tuned, but take hours: those of the paper.
 SLOW = {"rhc_gradient", "full_orientation"}
 HEAD = "policy,scenario,seeds,episodes,cost_ratio,time_p99_us,front\n"
@@ -19,12 +19,6 @@ HEAD = "policy,scenario,seeds,episodes,cost_ratio,time_p99_us,front\n"
 def test_tuned_solvers_have_two_rows(name):
     """One with the defaults and one with the settings that were tuned on validation episodes."""
     assert sum(parsed(one["policy"])[0] == name for one in POSE) >= 2
-
-
-def test_agents_stand_beside_their_untrained_network():
-    rows = {one["policy"]: one for one in POSE}
-    assert {"agent_alone", "untrained"} <= rows.keys()
-    assert int(rows["untrained"]["seeds"]) == len(measure.SEEDS)
 
 
 def parsed(policy):
@@ -76,13 +70,20 @@ def test_costs_relative_to_the_lowest_are_measured_together(table):
     assert best["error_mm"] > 0.0
 
 
-def test_plants_are_measured_by_the_lines_of_their_table(table, monkeypatch):
-    monkeypatch.setattr(measure, "ADAPTIVE", {"mine": ("dls", {"gain": 0.5})})
-    head = "policy,scenario,episodes,cost_ratio,low,high,worst\n"
-    table("plants", f"{head}mine,panda-payload,2,,,,\nother,panda-bus,2,1.5,1.4,1.6,1.6\n")
-    new, old = measure.plants(only_new=True)
-    assert 1.0 < new["low"] < new["cost_ratio"] < new["high"] <= new["worst"]
+def test_a_label_stands_for_a_policy(table):
+    """With noise seeds, too."""
+    head = "policy,scenario,episodes,noise_seeds,cost_ratio,low,high,spec\n"
+    table("some", f'{head}mine,panda-field,2,2,,,,dls:gain=0.5\nother,panda-bus,2,1,1.5,1.4,1.6,"qp:gain=0.5"\n')
+    new, old = measure.measured("some", only_new=True)
+    assert (new["policy"], new["spec"]) == ("mine", "dls:gain=0.5")
+    assert 1.0 < new["low"] < new["cost_ratio"] < new["high"]
     assert old["cost_ratio"] == "1.5"
+
+
+def test_the_lines_of_plants_can_be_played():
+    for line in keeping.lines("plants"):
+        name, parameters = parsed(line["spec"])
+        registry.make(name, line["scenario"], **parameters, **{"seed": 0} if name == "told" else {})
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,12 @@ import pytest
 
 from baselines.cli import main
 from baselines.evaluation.compare.rule import PREFERRED
-from docs import keeping
-from docs.compare import FOLDER, ROBOTS
+from tests.robots import FOLDER, ROBOTS
 
 
 def compared(robot, path, capsys, *options):
     """Whether solvers follow, by solver and path, and the text."""
-    base, tip, _ = ROBOTS[robot]
+    base, tip, *_ = ROBOTS[robot]
     words = ["compare", str(FOLDER / f"{robot}.urdf"), str(path), "--base", base, "--tip", tip, "--acceleration", "5"]
     assert main([*words, *options]) == 0
     text = capsys.readouterr().out
@@ -32,12 +31,6 @@ def test_a_short_path(capsys, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_the_arms_of_the_page(robot, capsys):
-    rows, text = compared(robot, FOLDER / f"{robot}.csv", capsys, "--speed", str(ROBOTS[robot].speed))
-    lines = [one for one in keeping.lines("compare") if one["arm"] == robot]
-    (chosen,) = (line for line in lines if line["recommended"])
-    on_the_path = " on the retimed path" * (chosen["path"] == "retimed")
-    assert re.search(rf"^Recommended: {chosen['recommended']}{on_the_path}[.,]", text, re.MULTILINE)
-    for line in lines:
-        said = {name: "no" if "✗" in line[f"{name}_mm"] else "yes" for name in ("qp", "sns", "dls")}
-        assert {name: rows[name, line["path"]] for name in said} == said
+def test_recommendations(robot, capsys):
+    _, text = compared(robot, FOLDER / f"{robot}.csv", capsys, "--speed", str(ROBOTS[robot].speed))
+    assert re.search(rf"^Recommended: {ROBOTS[robot].recommended}[.,]", text, re.MULTILINE)

@@ -19,7 +19,7 @@ from baselines.cli.commands import path
 from baselines.cli.parsing import EpisodeOptions
 from baselines.paths import retiming
 from baselines.paths.starts import starts
-from docs.compare import FOLDER, ROBOTS
+from tests.robots import FOLDER, ROBOTS
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +35,7 @@ WELD = ("path", "weld.csv", "--arm", "panda", "--dt", "0.02")
 
 
 def command(robot, *more):
-    base, tip, _ = ROBOTS[robot]
+    base, tip, *_ = ROBOTS[robot]
     arm = ["--arm", str(FOLDER / f"{robot}.urdf"), "--base", base, "--tip", tip]
     return ["path", str(FOLDER / f"{robot}.csv"), *arm, "--speed", "0.2", "--corner-radius", "0.03", *more]
 

@@ -17,13 +17,13 @@ from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM
 from baselines.oracle.stripped import stripped
 from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels import threads
 from ikgym.plant import Plant
 from ikgym.trajectories import RandomJointSpline
 from tests.comparison import identical
+from tests.independent.casadi_horizon import CasadiHorizon
+from tests.independent.numpy_horizon import Horizon, plan_cost
 
 QUICK = Search(starts=12, chains=2, generations=1, rounds=4, polished=2, knots=20)
 

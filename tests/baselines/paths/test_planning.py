@@ -8,10 +8,10 @@ from baselines.paths import survey
 from baselines.paths.motion import path_duration
 from baselines.paths.planning import PLAYER, plan
 from baselines.paths.survey import FOLLOWED, Survey
-from docs.compare import ROBOTS
 from ikgym import scenarios, tasks
 from ikgym.obstacles.solids import closest
 from tests.bodied import POST, crowd
+from tests.robots import ROBOTS
 
 
 def unsurveyed(scenario, reserve=0.1):

@@ -9,9 +9,9 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import rollouts
-from benchmarks.rivals.numpy_horizon import beyond_limits, plan_cost
 from tests.baselines.solvers.receding_horizon.newton.states import DT, KNOTS, State, horizon_of, problem_of
 from tests.baselines.solvers.receding_horizon.test_rhc import observe
+from tests.independent.numpy_horizon import beyond_limits, plan_cost
 from tests.limited import limited
 
 SEEDS = ikgym.scenarios.seeds("validation", 2)

@@ -10,10 +10,10 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.status import Status
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from tests.baselines.solvers.receding_horizon.data import trapezoidal_weights
 from tests.comparison import identical
+from tests.independent.casadi_horizon import CasadiHorizon
+from tests.independent.numpy_horizon import Horizon, plan_cost
 
 VARGA = ["varga7-fast", "varga7-slow", "varga7-literal-fast", "varga7-literal-slow"]
 # The policy stops at 1e-7 of the cost, IPOPT at 1e-10 of its optimality; below costs of 1e-3 an absolute 1e-9 counts.

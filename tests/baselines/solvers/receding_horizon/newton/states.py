@@ -9,9 +9,9 @@ from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import PathProblem, newton_workspace
-from benchmarks.rivals.numpy_horizon import Horizon
 from ikgym.validation import read_only
 from tests.baselines.solvers.receding_horizon.newton.problems import grid_of
+from tests.independent.numpy_horizon import Horizon
 
 #: Knots, one a step of 2 ms.
 KNOTS = 29

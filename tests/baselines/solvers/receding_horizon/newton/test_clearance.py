@@ -13,8 +13,6 @@ from baselines.solvers.receding_horizon.newton.clearance import is_clear, keep_c
 from baselines.solvers.receding_horizon.newton.interior_point import minimise_limited
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, NewtonSettings
 from baselines.solvers.receding_horizon.newton.workspace import newton_workspace
-from benchmarks.rivals import casadi_kinematics
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
 from ikgym.arms.bodies import Bodies
 from ikgym.obstacles import HalfSpace, Sphere
 from tests.baselines.solvers.receding_horizon.newton.states import (
@@ -25,6 +23,8 @@ from tests.baselines.solvers.receding_horizon.newton.states import (
     solved,
 )
 from tests.baselines.solvers.receding_horizon.newton.test_cost import differences
+from tests.independent import casadi_kinematics
+from tests.independent.casadi_horizon import CasadiHorizon
 
 MARGIN = 1e-3
 AT = (1, 2, 4, 8, 15, 25)

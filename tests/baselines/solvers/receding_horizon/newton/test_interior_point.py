@@ -7,14 +7,14 @@ import pytest
 
 import ikgym
 from baselines.solvers.receding_horizon.newton.minimise import CONVERGED, STALLED
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon, beyond_limits
 from tests.baselines.solvers.receding_horizon.newton.states import (
     draw,
     horizon_of,
     problem_of,
     solved,
 )
+from tests.independent.casadi_horizon import CasadiHorizon
+from tests.independent.numpy_horizon import Horizon, beyond_limits
 
 
 @pytest.mark.parametrize(("at", "braking"), [((1,), True), ((2, 5), False), ((1, 2, 4, 8, 15, 25), True)])

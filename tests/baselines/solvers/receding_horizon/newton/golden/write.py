@@ -12,8 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.numpy_horizon import Horizon
 from tests.baselines.solvers.receding_horizon.newton.states import (
     DT,
     KNOTS,
@@ -21,6 +19,8 @@ from tests.baselines.solvers.receding_horizon.newton.states import (
     horizon_of,
     problem_of,
 )
+from tests.independent.casadi_horizon import CasadiHorizon
+from tests.independent.numpy_horizon import Horizon
 
 FILE = Path(__file__).parent / "horizons.json"
 STATES, SEED = 50, 2026

@@ -10,10 +10,10 @@ import casadi
 import numpy as np
 
 from baselines.policy import Problem
-from benchmarks.rivals.casadi_kinematics import residual
-from benchmarks.rivals.numpy_horizon import Horizon, Plan, plan_cost
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
+from tests.independent.casadi_kinematics import residual
+from tests.independent.numpy_horizon import Horizon, Plan, plan_cost
 
 #: Below a tolerance of 1e-10 IPOPT often does not detect convergence, and uses up its iterations;
 #: scaled by the gradient it finds its way from a far start in a fraction of the iterations.

@@ -7,13 +7,13 @@ import pytest
 
 import ikgym
 from baselines.policy import Problem
-from benchmarks.rivals.casadi_horizon import CasadiHorizon
-from benchmarks.rivals.casadi_kinematics import residual
-from benchmarks.rivals.numpy_horizon import Horizon, plan_cost
 from ikgym import TrackingCost
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.solvers.receding_horizon.data import data_of, horizon_cost, joint_weights
+from tests.independent.casadi_horizon import CasadiHorizon
+from tests.independent.casadi_kinematics import residual
+from tests.independent.numpy_horizon import Horizon, plan_cost
 
 
 def problem_of(arm: Arm, task: str = "skew", **cost: float) -> Problem:

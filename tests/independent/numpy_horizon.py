@@ -13,8 +13,8 @@ import dataclasses
 import numpy as np
 
 from baselines.policy import Problem
-from benchmarks.rivals.casadi_kinematics import residual
 from ikgym.validation import FloatArray
+from tests.independent.casadi_kinematics import residual
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
