@@ -36,7 +36,7 @@ STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500}
 def line(name: str) -> Line:
     """What passes of a problem, and how many of its poses can be reached, with and without collisions."""
     scenario = scenarios.get(name)
-    alone, poses = scenario.replace(collisions=False), len(problems.waypoints(name).positions)
+    alone, poses = scenario.replace(collisions=False), len(problems.get(name).positions)
     found = route(scenario)
     free = found if len(found) == poses else route(alone)
     if len(free) < poses:
@@ -49,7 +49,7 @@ def line(name: str) -> Line:
     out["rhc_foresight"] = int(whole and judged(scenario, found[0]).passed)
     passed, starts = among_starts(scenario)
     out |= {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
-    theirs = [verdict(scenario, problems.trajectory(name, method)) for method in problems.published(name)]
+    theirs = [verdict(scenario, joints) for joints in problems.get(name).trajectories.values()]
     return out | {
         "published": sum(one.passed for one in theirs),
         "published_clear": sum(one.clearance > 0.0 for one in theirs),

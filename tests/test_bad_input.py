@@ -378,8 +378,7 @@ REFUSED = [
     ("period", lambda: PublishedPath("rlitg-hello", 0.0)),
     *(("family|starts", lambda x=x: RandomPublishedPath(x, 0.2)) for x in ("none", "cppflow")),
     ("8 joints", lambda: PUBLISHED.replace(arm=ikgym.arms.get("fetch"))),
-    ("Did you mean 'rlitg-hello'", lambda: ikgym.problems.waypoints("rlitg-helo")),
-    ("Did you mean", lambda: ikgym.problems.trajectory("rlitg-hello", "greed")),
+    ("Did you mean 'rlitg-hello'", lambda: ikgym.problems.get("rlitg-helo")),
     *((name, lambda name=name, x=x: Plant(**{name: x})) for name, x in (
         *((name, -1.0) for name in ("zero", "link", "axis", "backlash", "noise", "q_noise", "pose_noise")),
         ("payload", np.inf), ("payload_step", 2.5), ("bandwidth", 0.0), ("bandwidth", (20, 10)),

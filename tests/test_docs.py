@@ -76,7 +76,7 @@ def test_readme_snippets_run(capsys, tmp_path, monkeypatch):
 
 #: What holds after the snippets of a page have run one after the other, in a folder of their own.
 SNIPPETS: dict[str, str] = {
-    "scenarios.md": "converged and len(greedy) == len(waypoints.positions) and driven.duration == found.duration and "
+    "scenarios.md": "converged and len(greedy) == len(problem.positions) and driven.duration == found.duration and "
     "np.allclose(arm.forward(q)[1], position + [0.1, 0.2, -0.1], atol=1e-9) and "
     "ikgym.scenarios.load('mine.toml').steps == scenario.steps",
     "bodies.md": "0.0 < distance < 0.2 and len(ikgym.scenarios.load('mine.toml').obstacles) == 2",

@@ -22,9 +22,8 @@ the programs that read the repositories are in the history of this one.
 from __future__ import annotations
 
 import functools
-import math
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,22 +53,26 @@ NAMES = (
     "cppflow-panda-square",
     *OBSTRUCTED,
 )
-#: Methods behind the initial trajectories, and their names in prose.
-METHODS = {"greedy": "greedy IK", "cloning": "behaviour cloning", "reinforcement": "reinforcement learning"}
 
 
-class Waypoints(NamedTuple):
-    """Waypoints of a path; all arrays are read-only.
+class Problem(NamedTuple):
+    """A path, and what was published with it; all arrays are read-only.
 
     Attributes:
-        positions: In the base frame of the arm, in [m]. Shape (k, 3).
-        quaternions: w, x, y, z, of length 1. Shape (k, 4).
+        positions: Of the waypoints in the base frame of the arm, in [m]. Shape (k, 3).
+        quaternions: Of the waypoints: w, x, y, z, of length 1. Shape (k, 4).
         starts: Joint coordinates at the first waypoint, in [rad]; none where none are published. Shape (s, n).
+        boxes: The obstacles: centres and edges of upright boxes in [m], and angles about z in [rad]. Shape (b, 7).
+        trajectories: Initial trajectories by method: `greedy` inverse kinematics, behaviour `cloning`, `reinforcement`
+            learning. They begin at the first start: joint coordinates in [rad], one row a waypoint. Joints without
+            limits are published modulo 2π, and may jump by it. Shapes (k, n).
     """
 
     positions: FloatArray
     quaternions: FloatArray
     starts: FloatArray
+    boxes: FloatArray
+    trajectories: Mapping[str, FloatArray]
 
 
 def names(family: str = "") -> tuple[str, ...]:
@@ -77,48 +80,14 @@ def names(family: str = "") -> tuple[str, ...]:
     return tuple(name for name in NAMES if name.startswith(family))
 
 
-def waypoints(name: str) -> Waypoints:
-    """The waypoints of a problem.
+def get(name: str) -> Problem:
+    """The problem of a name.
 
     Raises:
         UnknownNameError: There is no such problem; the message has the nearest name.
     """
-    known_name("problem", name, names())
-    return _stored()[name]
-
-
-def published(name: str) -> tuple[str, ...]:
-    """The methods, of :data:`METHODS`, whose initial trajectory for a problem is published here."""
-    return tuple(method for method in METHODS if (name, method) in _trajectories())
-
-
-def trajectory(name: str, method: str) -> FloatArray:
-    """A published initial trajectory, which begins at the first start.
-
-    Args:
-        name: The problem.
-        method: One of :data:`METHODS`.
-
-    Returns:
-        Joint coordinates in [rad], one row a waypoint. Joints without limits are published modulo 2π, and may jump by
-        it. Shape (k, n).
-
-    Raises:
-        UnknownNameError: There is no such problem, or no such trajectory of it; the message has the nearest name.
-    """
-    known_name("problem", name, names())
-    known_name(f"initial trajectory of {name}", method, published(name))
-    return _trajectories()[name, method]
-
-
-def boxes(name: str) -> FloatArray:
-    """The obstacles of a problem: centres and edges of upright boxes in [m], and angles about z in [rad]. Shape (b, 7).
-
-    Raises:
-        UnknownNameError: There is no such problem; the message has the nearest name.
-    """
-    known_name("problem", name, names())
-    return _boxes()[name]
+    known_name("problem", name, NAMES)
+    return _read(name)
 
 
 @functools.cache
@@ -128,39 +97,34 @@ def _archive() -> dict[str, Any]:
 
 
 @functools.cache
-def _stored() -> dict[str, Waypoints]:
-    stored, out = _archive(), {}
-    shapes = stored["start_shapes"].tolist()
-    starts = np.split(stored["starts"] / FINE, np.cumsum([math.prod(shape) for shape in shapes])[:-1])
-    poses = _restored(stored["poses"], stored["lengths"].tolist(), FINE, WAYPOINTS_ORDER)
-    for name, pose, start, shape in zip(stored["names"].tolist(), poses, starts, shapes, strict=True):
-        # Rounding is taken off the length of quaternions.
-        quaternions = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
-        out[name] = Waypoints(*map(read_only, (pose[:, :3].copy(), quaternions, start.reshape(shape))))
-    return out
-
-
-@functools.cache
-def _boxes() -> dict[str, FloatArray]:
+def _read(name: str) -> Problem:
     stored = _archive()
-    parts = np.split(stored["boxes"], np.cumsum(stored["box_counts"])[:-1])
-    return dict(zip(stored["names"].tolist(), map(read_only, parts), strict=True))
+    order, owners, methods = (stored[key].tolist() for key in ("names", "trajectory_names", "methods"))
+    number, lengths, shapes = order.index(name), stored["lengths"], stored["start_shapes"]
+    poses = _restored(_part(stored["poses"], lengths, number), FINE, WAYPOINTS_ORDER)
+    # Rounding is taken off the length of quaternions.
+    quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    starts = _part(stored["starts"], shapes.prod(axis=1), number).reshape(shapes[number]) / FINE
+    boxes = _part(stored["boxes"].T, stored["box_counts"], number).T
+    rows = lengths[[order.index(owner) for owner in owners]]
+    trajectories = {
+        method: read_only(_restored(_part(stored["joints"], rows, k), COARSE, TRAJECTORIES_ORDER))
+        for k, (owner, method) in enumerate(zip(owners, methods, strict=True))
+        if owner == name
+    }
+    positions, quaternions, starts, boxes = (read_only(a.copy()) for a in (poses[:, :3], quaternions, starts, boxes))
+    return Problem(positions, quaternions, starts, boxes, trajectories)
 
 
-@functools.cache
-def _trajectories() -> dict[tuple[str, str], FloatArray]:
-    stored = _archive()
-    keys = list(zip(stored["trajectory_names"].tolist(), stored["methods"].tolist(), strict=True))
-    lengths = [len(_stored()[name].positions) for name, _ in keys]
-    paths = _restored(stored["joints"], lengths, COARSE, TRAJECTORIES_ORDER)
-    return dict(zip(keys, map(read_only, paths), strict=True))
+def _part(values: npt.NDArray[Any], lengths: npt.NDArray[np.int64], number: int) -> npt.NDArray[Any]:
+    """One of several parts of the last axis, given the length of each."""
+    end = lengths[: number + 1].sum()
+    return values[..., end - lengths[number] : end]
 
 
-def _restored(packed: npt.NDArray[np.int32], lengths: Sequence[int], scale: int, order: int) -> list[FloatArray]:
-    """Tables of k_i rows from the differences of some order of whole multiples of 1 / scale. Shape (c, Σ k_i)."""
-    out = []
-    for part in np.split(packed.T.astype(np.int64), np.cumsum(lengths)[:-1]):
-        for _ in range(order):
-            part = np.cumsum(part, axis=0)
-        out.append(part / scale)
-    return out
+def _restored(packed: npt.NDArray[np.int32], scale: int, order: int) -> FloatArray:
+    """A table of k rows from the differences of some order of whole multiples of 1 / scale. Shapes (c, k), (k, c)."""
+    table = packed.T.astype(np.int64)
+    for _ in range(order):
+        table = np.cumsum(table, axis=0)
+    return table / scale

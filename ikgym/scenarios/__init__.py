@@ -206,14 +206,15 @@ def _make_published(problem: str) -> Scenario:
     arm = like.arm
     if arm.name == "panda":
         arm = arms.get("panda-hand").replace(tool=arm.tool, acceleration_limit=arm.acceleration_limit)
-    rows = problems.boxes(problem)
+    published = problems.get(problem)
+    rows = published.boxes
     zeros = np.zeros((2, len(rows)))
     turned = matrices(np.column_stack([np.cos(0.5 * rows[:, 6]), *zeros, np.sin(0.5 * rows[:, 6])]))
     return like.replace(
         name=problem,
         arm=arm,
         trajectory=PublishedPath(problem, PERIOD),
-        steps=round(PERIOD / like.dt) * (len(problems.waypoints(problem).positions) - 1),
+        steps=round(PERIOD / like.dt) * (len(published.positions) - 1),
         start=None,
         obstacles=[Box(f"box {i + 1}", row[:3], row[3:6], turned[i]) for i, row in enumerate(rows)],
     )

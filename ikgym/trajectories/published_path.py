@@ -37,12 +37,7 @@ class PublishedPath(Trajectory):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        problems.waypoints(self.problem)
-
-    @property
-    def waypoints(self) -> problems.Waypoints:
-        """The waypoints of the problem."""
-        return problems.waypoints(self.problem)
+        problems.get(self.problem)
 
     @property
     def duration(self) -> float:
@@ -55,7 +50,8 @@ class PublishedPath(Trajectory):
 
     def first_joints(self) -> FloatArray | None:
         """See :meth:`Trajectory.first_joints`."""
-        return self.waypoints.starts[0] if len(self.waypoints.starts) else None
+        starts = problems.get(self.problem).starts
+        return starts[0] if len(starts) else None
 
     def first_joints_bound(self) -> FloatArray | None:
         """See :meth:`Trajectory.first_joints_bound`."""
@@ -64,7 +60,7 @@ class PublishedPath(Trajectory):
 
     @functools.cached_property
     def _timed(self) -> TimedWaypoints:
-        positions, quaternions, _ = self.waypoints
+        positions, quaternions, *_ = problems.get(self.problem)
         return TimedWaypoints(self.period * np.arange(len(positions), dtype=np.float64), positions, quaternions)
 
 
@@ -87,7 +83,7 @@ class RandomPublishedPath(Trajectory):
     def __post_init__(self) -> None:
         super().__post_init__()
         members = problems.names(self.family) if isinstance(self.family, str) else ()
-        if not members or not all(len(problems.waypoints(name).starts) for name in members):
+        if not members or not all(len(problems.get(name).starts) for name in members):
             raise InvalidInputError(
                 f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
                 f"available: {list_names(problems.names())}."
@@ -100,7 +96,7 @@ class RandomPublishedPath(Trajectory):
 
     def first_joints_bound(self) -> FloatArray:
         """See :meth:`Trajectory.first_joints_bound`; true for all that may be drawn."""
-        starts = [problems.waypoints(name).starts[0] for name in problems.names(self.family)]
+        starts = [problems.get(name).starts[0] for name in problems.names(self.family)]
         bound: FloatArray = np.abs(starts).max(axis=0)
         return bound
 
@@ -111,7 +107,7 @@ class RandomPublishedPath(Trajectory):
         between two knots it leaves the line between them by no more than 32/27 of the longest step, less than 2.
         """
         del times, model
-        return max(_reach(problems.waypoints(name).positions) for name in problems.names(self.family))
+        return max(_reach(problems.get(name).positions) for name in problems.names(self.family))
 
 
 def _reach(positions: FloatArray) -> float:

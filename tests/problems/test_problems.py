@@ -20,20 +20,20 @@ def test_names():
 
 @pytest.mark.parametrize("name", [*DRAWN, *RANDOM[::10]])
 def test_shapes_and_units(name):
-    positions, quaternions, starts = problems.waypoints(name)
+    positions, quaternions, starts, *_ = problems.get(name)
     assert positions.shape == (len(positions), 3)
     assert quaternions.shape == (len(positions), 4)
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-15)
     expected = 0 if name.startswith("cppflow") else 1 if name in RANDOM else 100
     assert starts.shape == (expected, 7)
-    assert not any(array.flags.writeable for array in problems.waypoints(name))
+    assert not any(array.flags.writeable for array in problems.get(name)[:4])
 
 
 def test_the_numbers_have_not_changed():
     digest = hashlib.sha256()
     for name in (*DRAWN[:5], *RANDOM, *DRAWN[5:], *problems.OBSTRUCTED):
-        trajectories = (problems.trajectory(name, method) for method in problems.published(name))
-        for array in (*problems.waypoints(name), problems.boxes(name), *trajectories):
+        *arrays, trajectories = problems.get(name)
+        for array in (*arrays, *trajectories.values()):
             digest.update(np.rint(1e6 * array).astype(np.int64).tobytes())
     assert digest.hexdigest()[:12] == "72e2c5cc1574"
 
@@ -42,7 +42,7 @@ def test_the_first_waypoints_are_where_the_published_starts_are():
     """Base, tool, order of the quaternions and rest posture of the torso: all would show here."""
     arm = ikgym.arms.get("fetch_arm")
     for name in (*DRAWN[:5], *RANDOM):
-        positions, quaternions, starts = problems.waypoints(name)
+        positions, quaternions, starts, *_ = problems.get(name)
         rotations, there = arm.forward(starts)
         assert np.linalg.norm(there - positions[0], axis=1).max() < 1.5e-5
         wanted = Rotation.from_quat(quaternions[0], scalar_first=True)
@@ -50,17 +50,16 @@ def test_the_first_waypoints_are_where_the_published_starts_are():
 
 
 def test_published_trajectories_belong_to_their_paths():
-    assert {name for name in problems.NAMES if problems.published(name)} == {
+    assert {name for name in problems.NAMES if problems.get(name).trajectories} == {
         *("rlitg-hello", "rlitg-rotation", "rlitg-zig"),
         *RANDOM,
         "rlitg-square",
         *problems.names("rlitg-obstacle-"),
     }
     for name in ("rlitg-hello", "rlitg-random-042"):
-        positions, _, starts = problems.waypoints(name)
-        assert problems.published(name) == ("greedy", "cloning", "reinforcement")
-        for method in problems.published(name):
-            q = problems.trajectory(name, method)
+        positions, _, starts, _, trajectories = problems.get(name)
+        assert tuple(trajectories) == ("greedy", "cloning", "reinforcement")
+        for q in trajectories.values():
             assert q.shape == (len(positions), 7)
             assert not q.flags.writeable
             np.testing.assert_allclose(q[0], starts[0], atol=1e-5)
@@ -68,21 +67,21 @@ def test_published_trajectories_belong_to_their_paths():
 
 @pytest.mark.parametrize(("one", "other"), [("hello", "hello"), ("rotation", "rot_yz")])
 def test_both_sources_have_two_paths_in_common(one, other):
-    first, second = problems.waypoints(f"rlitg-{one}"), problems.waypoints(f"cppflow-fetch_arm-{other}")
+    first, second = problems.get(f"rlitg-{one}"), problems.get(f"cppflow-fetch_arm-{other}")
     np.testing.assert_allclose(first.positions, second.positions, atol=1.1e-6)
     np.testing.assert_allclose(first.quaternions, second.quaternions, atol=1e-12)
 
 
 def test_boxes_are_where_they_were_published():
     """Numbers of the files: centres in the base frame, edges, and the yaw of RL-ITG's only turned boxes."""
-    assert problems.boxes("rlitg-square").tolist() == [[0.75, 0.0, 0.36, 0.70, 1.40, 0.72, 0.0]]
-    assert problems.boxes("cppflow-panda-1cube").tolist() == [[0.0, 0.2, 0.7, 0.25, 0.25, 0.25, 0.0]]
-    np.testing.assert_allclose(problems.boxes("cppflow-fetch-s")[0], [0.75, 0.0, 0.16, 0.70, 1.40, 0.72, 0.0])
-    counts = [len(problems.boxes(name)) for name in problems.names("rlitg-obstacle")]
+    assert problems.get("rlitg-square").boxes.tolist() == [[0.75, 0.0, 0.36, 0.70, 1.40, 0.72, 0.0]]
+    assert problems.get("cppflow-panda-1cube").boxes.tolist() == [[0.0, 0.2, 0.7, 0.25, 0.25, 0.25, 0.0]]
+    np.testing.assert_allclose(problems.get("cppflow-fetch-s").boxes[0], [0.75, 0.0, 0.16, 0.70, 1.40, 0.72, 0.0])
+    counts = [len(problems.get(name).boxes) for name in problems.names("rlitg-obstacle")]
     assert (len(counts), sum(counts), max(counts)) == (100, 102, 3)
-    turned = [row for name in problems.names("rlitg-obstacle") for row in problems.boxes(name).tolist() if row[6]]
+    turned = [row for name in problems.names("rlitg-obstacle") for row in problems.get(name).boxes.tolist() if row[6]]
     assert turned == [[0.51, 0.2, 0.625658483, 0.15, 0.15, 0.3, 0.3], [0.9, -0.4, 0.725658483, 0.15, 0.15, 0.7, -0.3]]
-    name = next(name for name in problems.names("rlitg-obstacle") if len(problems.boxes(name)) == 3)
+    name = next(name for name in problems.names("rlitg-obstacle") if len(problems.get(name).boxes) == 3)
     box = ikgym.scenarios.get(name).obstacles[1]
     np.testing.assert_allclose(box.rotation, Rotation.from_euler("z", 0.3).as_matrix(), atol=1e-12)
-    assert problems.boxes("rlitg-hello").shape == (0, 7)
+    assert problems.get("rlitg-hello").boxes.shape == (0, 7)

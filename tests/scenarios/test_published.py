@@ -44,7 +44,7 @@ def test_names():
 )
 def test_the_waypoints_are_met_at_their_steps_from_a_clear_start_on(name):
     scenario = scenarios.get(name)
-    positions, quaternions, starts = problems.waypoints(name)
+    positions, quaternions, starts, *_ = problems.get(name)
     steps = waypoint_steps(len(positions))
     assert steps[-1] == scenario.steps
     nominal = scenario.nominal()[steps]
@@ -78,13 +78,13 @@ def test_the_seed_chooses_a_path_and_its_start():
     starts = [env.reset(seed=seed)[0]["q"] for seed in (3, 4, 3)]
     assert identical(starts[0], starts[2])
     assert not identical(starts[0], starts[1])
-    published = [problems.waypoints(name).starts[0] for name in problems.names("rlitg-random-")]
+    published = [problems.get(name).starts[0] for name in problems.names("rlitg-random-")]
     assert all(any(identical(one, start) for start in published) for one in starts)
 
 
 def test_what_is_out_of_reach():
     for name, missed in {"cppflow-panda-square": range(153, 182), "cppflow-fetch-rot_yz": ()}.items():
-        scenario, (positions, quaternions, _) = scenarios.get(name), problems.waypoints(name)
+        scenario, (positions, quaternions, *_) = scenarios.get(name), problems.get(name)
         rotations = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
         converged = scenario.arm.inverse(rotations, positions, restarts=300)[1]
         assert np.flatnonzero(~converged).tolist() == list(missed)

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.rotations import geodesic_angle
 from ikgym.scenarios import Scenario
@@ -53,7 +54,7 @@ def verdict(scenario: Scenario, q: FloatArray) -> Verdict:
     """
     if not isinstance(scenario.trajectory, PublishedPath):
         raise InvalidInputError(f"Expected a scenario with a published path, got {scenario.name!r}.")
-    arm, (positions, quaternions, _) = scenario.arm, scenario.trajectory.waypoints
+    arm, (positions, quaternions, *_) = scenario.arm, problems.get(scenario.trajectory.problem)
     path = float_array("q", q, (len(positions), arm.joints))
     rotations, there = arm.forward(path)
     angles = map(geodesic_angle, rotations, matrices(quaternions))

@@ -13,7 +13,7 @@ from ikgym import problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import PublishedPath
-from ikgym.validation import FloatArray, whole_number
+from ikgym.validation import FloatArray, known_name, whole_number
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,9 +49,10 @@ class Published(FollowNominal):
             UnknownNameError: There is no such trajectory of its path.
         """
         path = _path(scenario, parameters.get("seed"))
-        joints = problems.trajectory(path.problem, parameters.get("method", cls.method))
+        method, joints = parameters.get("method", cls.method), problems.get(path.problem).trajectories
+        known_name(f"initial trajectory of {path.problem}", method, joints)
         times = scenario.times(scenario.steps + 1)
-        return cls(Problem.of(scenario), path=_along(joints, scenario, times / path.period), **parameters)
+        return cls(Problem.of(scenario), path=_along(joints[method], scenario, times / path.period), **parameters)
 
 
 def _path(scenario: Scenario, seed: int | None) -> PublishedPath:

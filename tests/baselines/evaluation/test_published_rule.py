@@ -32,13 +32,15 @@ def test_an_exact_path_passes_and_each_fault_fails():
 
 def test_a_full_turn_of_a_joint_without_limits_is_no_motion():
     name = "rlitg-random-041"
-    joints = problems.trajectory(name, "cloning")
+    joints = problems.get(name).trajectories["cloning"]
     assert np.abs(np.diff(joints, axis=0)).max() > 6.0
     assert verdict(scenarios.get(name), joints).turn < 1.0
 
 
 def test_published_trajectories_fail():
-    judged = [verdict(scenarios.get(name), problems.trajectory(name, "greedy")) for name in problems.OBSTRUCTED[1:12]]
+    judged = [
+        verdict(scenarios.get(name), problems.get(name).trajectories["greedy"]) for name in problems.OBSTRUCTED[1:12]
+    ]
     assert not any(one.passed for one in judged)
     assert not any(one.followed for one in judged)
     assert {one.clearance > 0.0 for one in judged} == {False, True}
@@ -47,8 +49,8 @@ def test_published_trajectories_fail():
 @pytest.mark.slow
 def test_no_published_trajectory_passes():
     """The figures of docs/bodies.md."""
-    names = [(name, method) for name in problems.OBSTRUCTED for method in problems.published(name)]
-    judged = [verdict(scenarios.get(name), problems.trajectory(name, method)) for name, method in names]
+    paths = [(name, q) for name in problems.OBSTRUCTED for q in problems.get(name).trajectories.values()]
+    judged = [verdict(scenarios.get(name), q) for name, q in paths]
     assert len(judged) == 102
     assert not any(one.passed or one.followed for one in judged)
 

@@ -15,7 +15,7 @@ def test_it_is_at_the_published_joint_coordinates_at_the_waypoints():
     """Where no limit acts, what is played is what was published, but for the rounding of float32 actions."""
     method = "reinforcement"
     played = baselines.track(SHORT, f"published:{method}")
-    joints = problems.trajectory("rlitg-hello", method)[:21]
+    joints = problems.get("rlitg-hello").trajectories[method][:21]
     np.testing.assert_allclose(played.q[9::10], joints[1:], atol=1e-7)
     assert played.parameters == {"method": method, "seed": None}
     # Straight on from waypoint to waypoint.
@@ -28,14 +28,14 @@ def test_the_seed_says_which_path_it_plays():
     (name,) = [
         one
         for one in problems.names("rlitg-random-")
-        if np.allclose(problems.waypoints(one).positions[0], scenario.nominal(3)[0, 9:])
+        if np.allclose(problems.get(one).positions[0], scenario.nominal(3)[0, 9:])
     ]
-    np.testing.assert_allclose(played.q[9::10], problems.trajectory(name, "greedy")[1:3], atol=1e-6)
+    np.testing.assert_allclose(played.q[9::10], problems.get(name).trajectories["greedy"][1:3], atol=1e-6)
 
 
 def test_joints_without_limits_go_on_instead_of_jumping():
     name = "rlitg-random-041"
-    joints = problems.trajectory(name, "cloning")
+    joints = problems.get(name).trajectories["cloning"]
     assert np.abs(np.diff(joints, axis=0)).max() > 6.0
     path = registry.make("published", name, method="cloning").path
     assert np.abs(np.diff(path, axis=0)).max() < 0.1
