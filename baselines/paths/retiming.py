@@ -131,7 +131,7 @@ def best_candidate(found: Survey, errors: Errors, fastest: bool) -> Candidate | 
 
 def _by_another(found: Survey, rough: Candidate | None, fastest: bool) -> Candidate | None:
     """A timing that another solver follows closely: that of `qp`, or those of the best branches; None if none."""
-    timings = [(one, one.shortest if fastest else one.asked) for one in found.branches[:OTHER_BRANCHES]]
+    timings = [(one, found.timing_of(one, fastest)) for one in found.branches[:OTHER_BRANCHES]]
     if rough is not None:
         timings.insert(0, (rough.branch, rough.timing))
     for slower, solver in itertools.product(OTHER_SLOWER, OTHERS):
@@ -162,7 +162,7 @@ def refusal(found: Survey) -> str:
 
 def _faster(found: Survey, branch: Branch, best: Candidate | None, errors: Errors, fastest: bool) -> Candidate | None:
     """The fastest timing along a branch that is faster than the best so far; else that one."""
-    timing = branch.shortest if fastest else branch.asked
+    timing = found.timing_of(branch, fastest)
     if timing is None:
         return best
     most = SLOWEST if best is None else min(SLOWEST, (1.0 - PRECISION) * best.timing.duration / timing.duration)

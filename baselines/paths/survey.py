@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from baselines.controller.guards import Guards
 from baselines.paths.motion import PREFERRED, Motion, ideal, in_time, path_duration, played
 from baselines.paths.starts import starts
 from baselines.paths.timing import Timing, grid, shortest
@@ -153,6 +154,11 @@ class Survey:
             self._motions[solver] = self.play(solver, start=self.best.start)
         return followed(self._motions[solver], errors)
 
+    def timing_of(self, branch: Branch, fastest: bool) -> Timing | None:
+        """The timing of a branch, as fast as asked or as the limits allow; eased in where there is a reserve."""
+        timing = branch.shortest if fastest else branch.asked
+        return timing.eased_in() if timing and self.reserve else timing
+
     def play(self, solver: str, start: FloatArray, **changes: Any) -> list[Motion]:
         """Motions of a solver from a start on the changed scenario: within the limits less the reserve, and the whole.
 
@@ -172,11 +178,17 @@ def followed(motions: Sequence[Motion], errors: tuple[float, float]) -> Motion |
 
 
 def with_reserve(scenario: Scenario, reserve: float) -> Scenario:
-    """The scenario with limits of velocity and acceleration that are smaller by a share; the same without one."""
+    """The scenario with limits of velocity and acceleration that are smaller by a share; the same without one.
+
+    Accelerations that the arm does not limit are limited as in the control loop, see :class:`Guards`.
+    """
     if reserve == 0.0:
         return scenario
     arm, left = scenario.arm, 1.0 - reserve
-    slower = {name: left * getattr(arm, name) for name in ("velocity_limit", "acceleration_limit")}
+    slower = {
+        "velocity_limit": left * arm.velocity_limit,
+        "acceleration_limit": left * Guards().acceleration(arm),
+    }
     return scenario.replace(arm=arm.replace(**slower), velocity_limit=left * scenario.velocity_limit)
 
 

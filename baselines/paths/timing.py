@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ikgym.trajectories import RetimedTrajectory, Trajectory
+from ikgym.trajectories.splines import CubicSpline
 from ikgym.validation import FloatArray
 
 #: Grid points of a path.
@@ -17,6 +18,9 @@ POINTS = 300
 AT_ONCE = 1e-5
 #: A rest at both ends lets the rate grow without bounds there; it is at most so many times the average one.
 FASTEST = 6.0
+#: In which time in [s] a motion that leaves a reserve gets up to speed, which takes half of it, and points in it. The
+#: control loop begins late by the delay and lag of the drives, which it does not know yet.
+EASE, EASED = 0.2, 21
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,6 +45,18 @@ class Timing:
     def slower(self, factor: float) -> Timing:
         """The same in so many times the time."""
         return Timing(self.times * factor, self.progress, self.rates / factor)
+
+    def eased_in(self) -> Timing:
+        """The same from rest: within the first :data:`EASE` seconds the rate rises to that of before, smoothly."""
+        x, ease = np.linspace(0.0, 1.0, EASED), min(EASE, self.duration)
+        old, share = ease * x**3 * (1.0 - 0.5 * x), x * x * (3.0 - 2.0 * x)
+        curve = CubicSpline(self.times, self.progress[:, None], self.rates[:, None])
+        later = self.times > 0.5 * ease
+        return Timing(
+            np.append(ease * x, self.times[later] + 0.5 * ease),
+            np.append(curve(old)[:, 0], self.progress[later]),
+            np.append(share * np.maximum(curve(old, 1)[:, 0], 0.0), self.rates[later]),
+        )
 
     def of(self, trajectory: Trajectory) -> RetimedTrajectory:
         """A trajectory in this time."""

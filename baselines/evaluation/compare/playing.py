@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import textwrap
 from collections.abc import Iterable, Sequence
 
@@ -20,16 +19,14 @@ from baselines.evaluation.summary import COLUMNS as EVERY
 from baselines.evaluation.summary import ERRORS, TIMES, summarise
 from baselines.evaluation.table import Column, plain
 from baselines.paths import retime
+from baselines.paths.late import DELAY, LAG, late
 from ikgym.exceptions import InvalidInputError
-from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 
 #: Names of the paths in tables.
 AS_IT_IS, RETIMED, LATE = "as it is", "retimed", "late drives"
 #: Remark on the times of solvers of other projects.
 LIBRARY = "p50, p99 of pink and mink: calls of the library alone; with late drives all calls of the controller"
-#: Drives with a lag of first order, its time constant in [s], and a delay in steps.
-LAG, DELAY = 0.02, 2
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -99,11 +96,6 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     delayed = evaluate(driven, [(PREDICTED, {"policy": name, **SETTINGS}) for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
     return Comparison(scenario.dt, [*rows, *delayed], chosen, notes)
-
-
-def late(plant: Plant) -> Plant:
-    """The plant with late drives."""
-    return plant.replace(bandwidth=1.0 / (2.0 * math.pi * LAG), command_delay=DELAY)
 
 
 def _retime(scenario: Scenario, notes: list[str]) -> list[Scenario]:

@@ -60,8 +60,16 @@ def test_arms_that_are_not_in_the_catalogue(robot, capsys):
 @pytest.mark.slow
 def test_accelerations_that_the_control_loop_does_not_allow_are_named(capsys):
     """Without stated limits, also where the motion is not retimed: its sibling has limits, and no such line."""
+    assert main(["path", "iiwa14-fast", "--reserve", "0"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "velocities alone are checked" in text
+    assert re.search(r"Controller allows \d+\.\d+ rad/s² at joint_a\d, and may lose the path", text)
+    assert re.search(r"Controller stops after 0\.\d+ s \(PATH_ERROR\)", text)
     assert main(["path", "iiwa14-fast"]) == 0
-    assert re.search(r"Controller allows \d+\.\d+ rad/s² at joint_a\d, and may lose the path", capsys.readouterr().out)
+    text = " ".join(capsys.readouterr().out.split())
+    assert "those of Controller are kept" in text
+    assert "Controller allows" not in text
+    assert re.search(r"2 periods of delay, Controller follows within [\d.]+ mm", text)
 
 
 def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkeypatch):
@@ -75,7 +83,7 @@ def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkey
     assert main([*words, "2"]) == 0
     text = capsys.readouterr().out
     assert "It cannot be driven in 0.358 s, but in " in text
-    assert "PATH_ERROR" in text
+    assert "with a lag of 20 ms and 2 periods of delay, Controller" in text
     assert "Controller allows" not in text
     assert "% panda_joint" in text
     scenario, lines = ikgym.scenarios.load("slow.toml"), text.splitlines()

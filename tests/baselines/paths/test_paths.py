@@ -7,7 +7,9 @@ import pytest
 
 import baselines
 import ikgym
+from baselines.controller import Guards, StopReason
 from baselines.paths import Branch, retime, survey
+from baselines.paths.late import play_late
 from baselines.paths.motion import ideal, path_duration, played
 from baselines.paths.survey import FOLLOWED, REACHED
 from baselines.paths.timing import Timing
@@ -99,6 +101,15 @@ def test_a_reserve_is_left_to_feedback():
     motion = found.play("qp", less.scenario.start, trajectory=less.scenario.trajectory)[0]
     qdot = np.diff(motion.q[:, 0], axis=0) / scenario.dt
     assert (np.abs(qdot) <= 0.8 * (1.0 + 1e-6) * scenario.largest_qdot).all()
+    # The arm states no accelerations: those of the control loop, which follows on drives that lag.
+    assert not np.isfinite(scenario.arm.acceleration_limit).any()
+    qddot, allowed = np.diff(qdot, axis=0) / scenario.dt, Guards().acceleration(scenario.arm)
+    assert (np.abs(qddot) <= 0.8 * (1.0 + 1e-4) * allowed).all()
+    loop = play_late(less.scenario, less.solver)
+    assert loop.stopped is None
+    assert 1e-4 < loop.error < 5e-3
+    assert loop.time == pytest.approx(less.duration, abs=scenario.dt)
+    assert play_late(retime(scenario).scenario, "qp").stopped == StopReason.PATH_ERROR
     # Limits of the scenario that is written are those of the arm.
     np.testing.assert_array_equal(less.scenario.arm.velocity_limit, scenario.arm.velocity_limit)
     np.testing.assert_array_equal(less.scenario.velocity_limit, scenario.velocity_limit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.paths.timing import Timing, grid, shortest
+from baselines.paths.timing import EASE, Timing, grid, shortest
 from ikgym.trajectories import Trajectory
 
 FAR = 2.0
@@ -62,3 +62,20 @@ def test_the_same_in_another_time():
     assert timing.duration == 6.0
     np.testing.assert_array_equal(timing.of(_Any()).base_times(np.array([0.0, 3.0, 6.0])), [0.0, 1.5, 3.0])
     assert timing.slower(1.5).duration == 9.0
+
+
+@pytest.mark.parametrize("duration", [2.0, 0.05])
+def test_a_timing_that_is_eased_in(duration):
+    """It begins at rest, takes half of the ease longer, and is the same after it; also where it ends within it."""
+    before = Timing.uniform(duration, 1.0)
+    eased, ease = before.eased_in(), min(EASE, duration)
+    assert eased.duration == pytest.approx(duration + 0.5 * ease)
+    assert eased.rates[0] == 0.0
+    times = np.linspace(0.0, eased.duration, 500)
+    base = eased.of(_Any()).base_times(times)
+    rates = np.diff(base) / np.diff(times)
+    assert (rates >= 0.0).all()
+    assert rates.max() < 1.0 + 1e-6
+    assert np.abs(np.diff(rates)).max() < 2.0 * times[1] / ease  # 1.5 is the steepest slope of a smooth rise
+    later = times >= ease
+    np.testing.assert_allclose(base[later], times[later] - 0.5 * ease, atol=1e-9)
