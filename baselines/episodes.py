@@ -58,6 +58,8 @@ class Episode:
     """The record of one episode; row k belongs to step k, counted from 0.
 
     Args:
+        scenario: The scenario, with as many steps as were played.
+        seeds: The seeds of the episode.
         q: True joint coordinates after the step, in [rad] or [m]. Shape (steps, n).
         qdot: Joint velocities applied, in [rad/s] or [m/s]. Shape (steps, n).
         pose: True task coordinates after the step. Shape (steps, m).
@@ -78,6 +80,8 @@ class Episode:
         proximity_cost: Φ^C, 0 where the step does not count; None where the scenario has no such cost. Shape (steps,).
     """
 
+    scenario: Scenario
+    seeds: Seeds
     q: FloatArray
     qdot: FloatArray
     pose: FloatArray
@@ -107,14 +111,14 @@ class Recording:
 
     Args:
         scenario: The scenario.
-        rows: Number of episodes.
+        seeds: The seeds of each episode.
 
     Attributes:
         time_ns: Wall times of the calls of `predict`, in [ns], of one episode whose calls are timed.
     """
 
-    def __init__(self, scenario: Scenario, rows: int) -> None:
-        self._scenario, self._rows = scenario, rows
+    def __init__(self, scenario: Scenario, seeds: Sequence[int | Seeds]) -> None:
+        self._scenario, self._seeds = scenario, [Seeds.of(seed) for seed in seeds]
         self._record: dict[str, npt.NDArray[Any]] = {}
         self._diagnostics: dict[str, npt.NDArray[Any]] = {}
         self.time_ns: list[int] = []
@@ -130,7 +134,7 @@ class Recording:
         for into, arrays in ((self._record, values), (self._diagnostics, diagnostics)):
             for name, array in arrays.items():
                 if name not in into:
-                    into[name] = np.empty((self._rows, self._scenario.steps, *array.shape[1:]), dtype=array.dtype)
+                    into[name] = np.empty((len(self._seeds), self._scenario.steps, *array.shape[1:]), dtype=array.dtype)
                 into[name][:, step] = array
 
     def episodes(self) -> list[Episode]:
@@ -138,11 +142,13 @@ class Recording:
         times = np.array(self.time_ns, dtype=np.int64)
         return [
             Episode(
+                self._scenario,
+                seeds,
                 **{name: values[row] for name, values in self._record.items()},
                 time_ns=times,
                 diagnostics={name: values[row] for name, values in self._diagnostics.items()},
             )
-            for row in range(self._rows)
+            for row, seeds in enumerate(self._seeds)
         ]
 
 
@@ -296,7 +302,7 @@ def rollouts(
     for group in [[chain] for chain in chains] if single else [chains]:
         state, played = None, []
         for together in zip(*group, strict=True):
-            stage, record = begin(scenario, together, single=single, **shown), Recording(scenario, len(together))
+            stage, record = begin(scenario, together, single=single, **shown), Recording(scenario, together)
             # A policy without a state knows that an episode begins.
             start: dict[str, Any] = {} if state is None else {"episode_start": np.ones(len(together), dtype=np.bool_)}
             with _no_garbage_collection():

@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Episode, Seeds
+from baselines.episodes import Episode
 from baselines.evaluation.motion.spline import smooth, stop
 from baselines.files import csv_text, json_text
 from ikgym.arms import Arm
 from ikgym.exceptions import MissingDependencyError
-from ikgym.scenarios import Scenario
 from ikgym.validation import FloatArray, known_names
 
 KIND = "trajectory_msgs/msg/JointTrajectory"
@@ -35,8 +34,9 @@ class Motion(NamedTuple):
     qdot: FloatArray
 
     @classmethod
-    def of(cls, scenario: Scenario, seeds: Seeds, episode: Episode) -> Motion:
+    def of(cls, episode: Episode) -> Motion:
         """The motion of an episode."""
+        scenario, seeds = episode.scenario, episode.seeds
         q = np.vstack([scenario.start_of(seeds.seed, seeds.arm_seed), episode.q])
         return cls(scenario.times(scenario.steps + 1), q, np.vstack([np.zeros(scenario.joints), episode.qdot]))
 
@@ -60,18 +60,14 @@ def table(columns: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return csv_text(columns, (["" if cell != cell else cell for cell in line] for line in lines)).encode()
 
 
-def motion_table(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
+def motion_table(episode: Episode, accelerations: bool = False) -> bytes:
     """The joint motion as CSV: times, joint coordinates and velocities, from the start, with units in the head."""
-    motion = Motion.of(scenario, seeds, episode)
-    columns = {
-        "time [s]": motion.times,
-        **by_joint(scenario.arm, motion.q),
-        **by_joint(scenario.arm, motion.qdot, "/s"),
-    }
-    return table(columns | (by_joint(scenario.arm, motion.qddot, "/s²") if accelerations else {}))
+    motion, arm = Motion.of(episode), episode.scenario.arm
+    columns = {"time [s]": motion.times, **by_joint(arm, motion.q), **by_joint(arm, motion.qdot, "/s")}
+    return table(columns | (by_joint(arm, motion.qddot, "/s²") if accelerations else {}))
 
 
-def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> dict[str, Any]:
+def message(episode: Episode, accelerations: bool = False) -> dict[str, Any]:
     """The fields of the message; a time of 0 in the header means at once.
 
     From rest at the start to rest at the end, see :func:`baselines.evaluation.motion.spline.stop`, with the velocities
@@ -81,7 +77,8 @@ def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: b
     Raises:
         InvalidInputError: The episode ends in motion, and has no room to stop.
     """
-    q = stop(scenario.arm, Motion.of(scenario, seeds, episode).q, scenario.dt)
+    scenario = episode.scenario
+    q = stop(scenario.arm, Motion.of(episode).q, scenario.dt)
     points = smooth(q, scenario.dt)
     times = scenario.dt * np.arange(len(points.q))
     return {
@@ -100,18 +97,18 @@ def message(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: b
     }
 
 
-def joint_trajectory(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
+def joint_trajectory(episode: Episode, accelerations: bool = False) -> bytes:
     """The message in JSON, which `ros2 topic pub` reads; see :func:`message`."""
-    return json_text(message(scenario, seeds, episode, accelerations)).encode()
+    return json_text(message(episode, accelerations)).encode()
 
 
-def mcap(scenario: Scenario, seeds: Seeds, episode: Episode, accelerations: bool = False) -> bytes:
+def mcap(episode: Episode, accelerations: bool = False) -> bytes:
     """An MCAP file with the message, which `ros2 bag` and readers without ROS open; see :func:`message`."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    fields = message(scenario, seeds, episode, accelerations)
+    fields = message(episode, accelerations)
     with tempfile.TemporaryDirectory() as folder:
         bag = pathlib.Path(folder) / "motion"
         with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
@@ -137,7 +134,7 @@ class Format(NamedTuple):
     """A kind of file: the suffix of its name, and its content, with accelerations or without."""
 
     suffix: str
-    content: Callable[[Scenario, Seeds, Episode, bool], bytes]
+    content: Callable[[Episode, bool], bytes]
     package: str = ""
 
 

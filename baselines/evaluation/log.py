@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Episode, Seeds
+from baselines.episodes import Episode
 from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
-from ikgym.scenarios import Scenario
+from ikgym.plant.draw import DrawnPlant
 from ikgym.validation import FloatArray
 
 #: Most pictures of a replay.
@@ -25,13 +25,8 @@ TrajectoryLog = dict[str, npt.NDArray[Any]]
 AT_REST = np.append(np.eye(3), np.zeros(3))
 
 
-def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> TrajectoryLog:
+def trajectory_log(episode: Episode) -> TrajectoryLog:
     """The data of the plots of an episode, at the steps that count.
-
-    Args:
-        scenario: The scenario.
-        seeds: Seeds of the episode.
-        episode: Its record.
 
     Returns:
         ``time`` in [s], of shape (k,), and over it ``nominal`` and ``pose`` (k, m), ``q`` and ``qdot`` (k, n),
@@ -44,11 +39,12 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         ``tool_rotation`` (f, 3, 3).
         Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of :func:`_place_solids`.
     """
+    scenario = episode.scenario
     after = np.flatnonzero(scenario.counted())
     kept = after - 1
     log: TrajectoryLog = {
         "time": after * scenario.dt,
-        "nominal": scenario.nominal(seeds.seed)[after],
+        "nominal": scenario.nominal(episode.seeds.seed)[after],
         "pose": episode.pose[kept],
         "q": episode.q[kept],
         "qdot": episode.qdot[kept],
@@ -66,12 +62,10 @@ def trajectory_log(scenario: Scenario, seeds: Seeds, episode: Episode) -> Trajec
         log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
         log["acceleration_limit"] = scenario.arm.acceleration_limit
     frames = frame_rows(len(kept), FRAMES)
-    log |= {"frame": frames, **_arm_in_space(scenario, seeds, log["q"][frames], after[frames])}
+    log |= {"frame": frames, **_arm_in_space(episode, log["q"][frames], after[frames])}
     if episode.clearance is None:
         return log
-    return (
-        log | {"clearance": episode.clearance[kept]} | _place_solids(scenario, seeds, log["q"][frames], after[frames])
-    )
+    return log | {"clearance": episode.clearance[kept]} | _place_solids(episode, log["q"][frames], after[frames])
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
@@ -81,9 +75,9 @@ def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     return frames
 
 
-def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
+def _arm_in_space(episode: Episode, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
     """Points of the arm that moves, which may differ from its data sheet, after numbers of steps."""
-    plant, n = scenario.drawn_plant(seeds.seed, seeds.arm_seed), scenario.joints
+    plant, n = _plant(episode), episode.scenario.joints
     loaded = after >= plant.payload_step
     points, tool, rotation = np.empty((len(q), n, 2, 3)), np.empty((len(q), 3)), np.empty((len(q), 3, 3))
     for rows, arm in ((~loaded, plant.arm), (loaded, plant.loaded_arm)):
@@ -93,14 +87,15 @@ def _arm_in_space(scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.ND
     return {name: array.astype(np.float32) for name, array in arrays.items()}
 
 
-def _place_solids(
-    scenario: Scenario, seeds: Seeds, q: FloatArray, after: npt.NDArray[np.int64]
-) -> dict[str, npt.NDArray[Any]]:
+def _plant(episode: Episode) -> DrawnPlant:
+    return episode.scenario.drawn_plant(episode.seeds.seed, episode.seeds.arm_seed)
+
+
+def _place_solids(episode: Episode, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
     """Solids in the frames that carry them, and the closest points; see :mod:`ikgym.obstacles.solids`.
 
     Args:
-        scenario: A scenario with collisions.
-        seeds: Seeds of the episode.
+        episode: An episode of a scenario with collisions.
         q: Joint coordinates at some moments in [rad] or [m]. Shape (f, n).
         after: The steps made then. Shape (f,).
 
@@ -109,8 +104,8 @@ def _place_solids(
         moments ``carrier_frames`` (f, c, 12): those of the base and the n links, that of all obstacles at rest, and
         those of the others; and ``closest`` (f, 2, 3) in [m].
     """
-    plant, bodies = scenario.drawn_plant(seeds.seed, seeds.arm_seed), scenario.arm.bodies
-    obstacles = scenario.obstacles_of(seeds.seed)
+    scenario, plant = episode.scenario, _plant(episode)
+    bodies, obstacles = scenario.arm.bodies, scenario.obstacles_of(episode.seeds.seed)
     boxes = solids_of(obstacles, scenario.dt * after.astype(np.float64), scenario.model)
     boxes = np.broadcast_to(boxes, (len(q), *boxes.shape[1:]))
     frames, points = np.empty((len(q), scenario.joints + 1, 12)), np.empty((len(q), 2, 3))

@@ -215,7 +215,6 @@ def measure(
     scenario: Scenario,
     policy: str,
     parameters: Mapping[str, Any],
-    seeds: Seeds,
     episode: Episode,
     *,
     machine: Mapping[str, Any],
@@ -226,11 +225,11 @@ def measure(
     ideal: str | None = None,
 ) -> Row:
     """The row of a recorded episode; see :class:`Row`; the cost ratio is stated against `best_known`."""
-    along_path: dict[str, Any] = {}
+    seeds, along_path = episode.seeds, dict[str, Any]()
     if "progress" in episode.diagnostics:
         from baselines.evaluation.motion.free_timing import first_steps, path_scores
 
-        along_path, episode = path_scores(scenario, seeds, episode), first_steps(episode, scenario.steps)
+        along_path, episode = path_scores(scenario, episode), first_steps(episode, scenario.steps)
     total = float(add_up(episode.cost))
     timed, later = len(episode.time_ns) > 0, episode.time_ns[1:] if len(episode.time_ns) > 1 else episode.time_ns
     counted = scenario.counted()[1:]

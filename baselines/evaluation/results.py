@@ -18,7 +18,6 @@ from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
 from baselines.evaluation.log import USUAL, trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
-from baselines.evaluation.motion.free_timing import as_long
 from baselines.files import (
     ResultsError,
     canonical,
@@ -119,11 +118,11 @@ class Results:
                 continue
             if job.first:
                 file = io.BytesIO()
-                np.savez_compressed(file, allow_pickle=False, **trajectory_log(job.scenario, job.seeds, episode))
+                np.savez_compressed(file, allow_pickle=False, **trajectory_log(episode))
                 write(self.series_file(row), file.getvalue())
             for kind in self._export:
                 try:
-                    motion = kind.content(as_long(job.scenario, episode), job.seeds, episode, self._accelerations)
+                    motion = kind.content(episode, self._accelerations)
                 except InvalidInputError as error:
                     reason = f"no {kind.suffix} of seed {row.seed}: {error}"
                     self.not_exported.append(Skipped(row.scenario, row.policy, reason))

@@ -166,7 +166,7 @@ def play(batch: Batch, tick: Tick | None = None) -> Played:
     out: Played = []
     for job in batch:
         episode, best = played[job.seeds], best_known.cost(scenario, job.seeds.seed, job.seeds.arm_seed)
-        row = measure(scenario, job.policy, job.parameters, job.seeds, episode, best_known=best, **about)
+        row = measure(scenario, job.policy, job.parameters, episode, best_known=best, **about)
         out.append((row, episode if job.record else None))
     return out
 

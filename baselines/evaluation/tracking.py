@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from baselines.episodes import Episode, Seeds, add_up
+from baselines.episodes import Episode, add_up
 from baselines.evaluation.export import Motion, by_joint, joint_trajectory, mcap, table
 from baselines.evaluation.foreign import Wrap
 from baselines.evaluation.jobs import job_of
 from baselines.evaluation.log import trajectory_log
-from baselines.evaluation.motion.free_timing import as_long
 from baselines.evaluation.plots import tracking as picture
 from baselines.evaluation.policies import AnyPolicy
 from baselines.evaluation.run import play
@@ -62,12 +61,12 @@ class Tracking:
     tracking_cost: FloatArray
     velocity_cost: FloatArray
     statuses: npt.NDArray[np.int64]
-    _played: tuple[Scenario, Seeds, Episode] = dataclasses.field(repr=False)
+    _episode: Episode = dataclasses.field(repr=False)
 
     @property
     def cost(self) -> FloatArray:
         """−reward, step by step: Φ^X, Φ^U and, where the scenario has it, Φ^C. Shape (steps,)."""
-        return self._played[2].cost
+        return self._episode.cost
 
     @property
     def total_cost(self) -> float:
@@ -77,7 +76,7 @@ class Tracking:
     @property
     def motion(self) -> Motion:
         """The joint motion from the start on."""
-        return Motion.of(*self._played)
+        return Motion.of(self._episode)
 
     @property
     def solver_status(self) -> Status:
@@ -86,7 +85,7 @@ class Tracking:
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """All numbers by name and unit, one number a step, as :meth:`to_csv` writes them."""
-        arm = self._played[0].arm
+        arm = self._episode.scenario.arm
         out: dict[str, npt.NDArray[Any]] = {"time [s]": self.times}
         out |= {**by_joint(arm, self.q), **by_joint(arm, self.qdot, "/s")}
         for name, values in (("pose", self.pose), ("nominal", self.nominal)):
@@ -97,7 +96,7 @@ class Tracking:
         out["orientation_error [rad]"] = self.orientation_error
         out["tracking_cost [1]"] = self.tracking_cost
         out["velocity_cost [1]"] = self.velocity_cost
-        if (near := self._played[2].proximity_cost) is not None:
+        if (near := self._episode.proximity_cost) is not None:
             out["proximity_cost [1]"] = near
         out["solver_status"] = np.array([Status(status).label for status in self.statuses.tolist()])
         return out
@@ -117,15 +116,15 @@ class Tracking:
             InvalidInputError: The episode ends in motion, and has no room to stop.
             ResultsError: The file cannot be written.
         """
-        write(pathlib.Path(file), joint_trajectory(*self._played, accelerations))
+        write(pathlib.Path(file), joint_trajectory(self._episode, accelerations))
 
     def to_mcap(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
         """Likewise as an MCAP file, by rosbags; see :meth:`to_joint_trajectory`."""
-        write(pathlib.Path(file), mcap(*self._played, accelerations))
+        write(pathlib.Path(file), mcap(self._episode, accelerations))
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
-        return picture.draw(f"{self.scenario}: {self.policy}", trajectory_log(*self._played))
+        return picture.draw(f"{self.scenario}: {self.policy}", trajectory_log(self._episode))
 
 
 def track(
@@ -160,11 +159,10 @@ def track(
     job = job_of(policy, found, whole_number("seed", seed, at_least=0), preview, wrap)
     ((row, episode),) = play((job,))
     assert episode is not None  # since the job asks for it
-    found = as_long(found, episode)
     names = ("q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost")
     arrays: dict[str, Any] = {name: getattr(episode, name) for name in names}
-    arrays["times"] = found.dt * np.arange(1, found.steps + 1)
-    arrays["nominal"] = found.nominal(seed)[1:]
+    arrays["times"] = found.dt * np.arange(1, len(episode.q) + 1)
+    arrays["nominal"] = episode.scenario.nominal(seed)[1:]
     arrays["statuses"] = episode.status
     kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _played=(found, job.seeds, episode))
+    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _episode=episode)

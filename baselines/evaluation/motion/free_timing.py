@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -44,21 +45,18 @@ def first_steps(episode: Episode, steps: int) -> Episode:
     """The beginning of an episode."""
     if len(episode.q) == steps:
         return episode
-    arrays = {name: values[:steps] for name, values in vars(episode).items() if isinstance(values, np.ndarray)}
+    arrays: dict[str, Any] = {
+        name: values[:steps] for name, values in vars(episode).items() if isinstance(values, np.ndarray)
+    }
     diagnostics = {name: values[:steps] for name, values in episode.diagnostics.items()}
-    return dataclasses.replace(episode, **arrays, diagnostics=diagnostics)
+    scenario = episode.scenario.replace(steps=steps)
+    return dataclasses.replace(episode, **arrays, scenario=scenario, diagnostics=diagnostics)
 
 
-def as_long(scenario: Scenario, episode: Episode) -> Scenario:
-    """The scenario with the steps that an episode has."""
-    steps = len(episode.q)
-    return scenario if steps == scenario.steps else scenario.replace(steps=steps)
-
-
-def path_scores(scenario: Scenario, seeds: Seeds, episode: Episode) -> dict[str, float | None]:
+def path_scores(scenario: Scenario, episode: Episode) -> dict[str, float | None]:
     """The columns of a row that state how the path was followed, see :class:`baselines.evaluation.metrics.Row`."""
     task, end = scenario.task, _end(scenario, episode)
-    error = task.error(reference_at(scenario, seeds, episode.diagnostics["progress"]), episode.pose)[:end]
+    error = task.error(reference_at(scenario, episode.seeds, episode.diagnostics["progress"]), episode.pose)[:end]
     first = 0 if task.kind in (POSE, AXIS) else task.error_size - 3
     position, angles = error[:, first : first + 3], error[:, 3:] if task.kind in (POSE, AXIS) else None
     return {

@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, rollout
+from baselines.episodes import rollout
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thin
@@ -36,7 +36,7 @@ def rows(tmp_path_factory):
 @pytest.fixture(scope="module")
 def log():
     scenario = crowd()
-    return scenario, trajectory_log(scenario, Seeds(0), rollout(scenario, baselines.make("dls", scenario), 0))
+    return scenario, trajectory_log(rollout(scenario, baselines.make("dls", scenario), 0))
 
 
 def test_a_row_has_the_step_of_the_stop_and_what_touched(rows):

@@ -28,10 +28,8 @@ def scenario(name="varga7-fast", **changes):
 
 
 def row_of(which, episode, **changes):
-    fields = {"policy": "dls", "parameters": {}, "seed": 0, "machine": MACHINE, "preview": 1, "fingerprint": "f"}
-    fields.update(changes)
-    policy, parameters, seed = (fields.pop(name) for name in ("policy", "parameters", "seed"))
-    return measure(which, policy, parameters, Seeds.of(seed), episode, **fields)
+    fields = {"parameters": {}, "machine": MACHINE, "preview": 1, "fingerprint": "f", **changes}
+    return measure(which, "dls", episode=episode, **fields)
 
 
 def restored(values):
@@ -43,7 +41,8 @@ def handmade(steps=4, **changes):
     arrays |= dict.fromkeys(("tracking_cost", "velocity_cost", "position_error"), np.zeros(steps))
     arrays |= {"orientation_error": np.full(steps, np.nan), "status": np.zeros(steps, dtype=np.int64)}
     arrays |= {"iterations": np.ones(steps, dtype=np.int64), "time_ns": np.full(steps, 1000, dtype=np.int64)}
-    return Episode(diagnostics={}, **arrays | {name: np.asarray(values) for name, values in changes.items()})
+    arrays |= {"scenario": position_scenario(steps), "seeds": Seeds(0), "diagnostics": {}}
+    return Episode(**arrays | {name: np.asarray(values) for name, values in changes.items()})
 
 
 def position_scenario(steps=4, **changes):
@@ -103,7 +102,7 @@ def test_a_joint_at_its_limit_counts_though_its_policy_keeps_the_limit():
     which = ikgym.scenarios.get("panda-fast")
     episode = rollout(which, baselines.make("qp", which), 0)
     assert not episode.at_limit.any()
-    row, shown = row_of(which, episode), limits(trajectory_log(which, Seeds(0), episode))
+    row, shown = row_of(which, episode), limits(trajectory_log(episode))
     assert row.steps_at_velocity_limit == (shown == VELOCITY).any(axis=1).sum() > 20
     assert row.steps_at_acceleration_limit >= (shown == ACCELERATION).any(axis=1).sum() > 20
     assert not row.followed

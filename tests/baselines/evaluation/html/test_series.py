@@ -5,15 +5,14 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, rollout
+from baselines.episodes import rollout
 from baselines.evaluation.html.series import ACCELERATION, BUDGET, FEWEST, FREE, STOP, VELOCITY, limits, thin
 from baselines.evaluation.log import FRAMES, frame_rows, trajectory_log
 from tests.limited import limited
 
 
 def log_of(scenario, seed=0, policy="dls"):
-    episode = rollout(scenario, baselines.make(policy, scenario), seed)
-    return trajectory_log(scenario, Seeds(seed), episode)
+    return trajectory_log(rollout(scenario, baselines.make(policy, scenario), seed))
 
 
 def decoded(array):
