@@ -26,9 +26,9 @@ class Wrapper(SolverPolicy, abc.ABC):
 
     `solve` of a wrapper splits its memory, asks the inner policy, and returns the changed action:
 
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         step = self.ask(batch, inside)
-        return self.solution(step.qdot, own, step)
+        return self.solution(step.qdot, outer, step)
 
     The inner policy acts as if it were alone: values not finite or beyond the velocity limit are dealt with as in
     its `predict`. Its memory follows that of the wrapper.
@@ -51,30 +51,30 @@ class Wrapper(SolverPolicy, abc.ABC):
 
     def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
         """See :meth:`SolverPolicy.restarted`; the inner policy keeps its memory."""
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         fresh = () if self.inner is None else self.inner.restarted(inside, rows)
-        return *self.own_restarted(own, rows), *fresh
+        return *self.own_restarted(outer, rows), *fresh
 
     def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
         """See :meth:`SolverPolicy.recall`; the inner policy's command."""
-        own, inside = self.split(memory)
-        return *own, *(() if self.inner is None else self.inner.recall(inside, qdot, change))
+        outer, inside = self.split(memory)
+        return *outer, *(() if self.inner is None else self.inner.recall(inside, qdot, change))
 
-    def own_restarted(self, own: Any, rows: npt.NDArray[np.bool_]) -> Memory:
+    def own_restarted(self, outer: Any, rows: npt.NDArray[np.bool_]) -> Memory:
         """The wrapper's memory, cleared where an episode begins."""
-        return replace_rows(own, self.own_memory(len(rows)), rows)
+        return replace_rows(outer, self.own_memory(len(rows)), rows)
 
     def split(self, memory: Memory) -> tuple[Any, Memory]:
         """The wrapper's part of the memory, of the type of :meth:`own_memory`, and that of the inner policy."""
         size, kind = self._own
-        own = memory[:size]
-        return own if kind is tuple else kind._make(own), memory[size:]
+        outer = memory[:size]
+        return outer if kind is tuple else kind._make(outer), memory[size:]
 
     @functools.cached_property
     def _own(self) -> tuple[int, Any]:
         """Number of arrays in the wrapper's memory, and its type."""
-        own = self.own_memory(1)
-        return len(own), type(own)
+        outer = self.own_memory(1)
+        return len(outer), type(outer)
 
     def ask(self, batch: Batch, memory: Memory) -> Solution:
         """The inner policy's step, see :meth:`SolverPolicy.act`, for its observations and its part of the memory."""
@@ -82,15 +82,15 @@ class Wrapper(SolverPolicy, abc.ABC):
         action, state = self.inner.act(batch, memory)
         return Solution(action * self.inner.problem.velocity_limit, read_memory(state), *self.inner.report(state))
 
-    def solution(self, qdot: FloatArray, own: Memory, step: Solution) -> Solution:
+    def solution(self, qdot: FloatArray, outer: Memory, step: Solution) -> Solution:
         """The result of `solve`: status and iterations are those of the inner policy.
 
         Args:
             qdot: Joint velocities in [rad/s] or [m/s]. Shape (B, n).
-            own: The wrapper's memory after the step.
+            outer: The wrapper's memory after the step.
             step: The inner policy's.
         """
-        return Solution(qdot, (*own, *step.memory), step.status, step.iterations)
+        return Solution(qdot, (*outer, *step.memory), step.status, step.iterations)
 
     def inner_state(self, state: Memory) -> Memory:
         """The state of the inner policy, as its `predict` would have returned it, in that of the wrapper."""

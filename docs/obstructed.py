@@ -1,6 +1,6 @@
 """The table `obstructed`: problems with obstacles that others published, by CppFlow's rule.
 
-`obstructed_paths.csv` has a line for each problem, and the table its sums. A line that stands there is not measured
+`obstructed_paths.csv` has a line for each problem, and the table its sums. A line that is there is not measured
 again. The start is free: `qp` plays from up to a hundred postures at the first pose, `rhc_foresight` from the start
 of the planned path. The joint velocities of both are limited to 7° a waypoint.
 """

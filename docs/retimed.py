@@ -22,7 +22,7 @@ PRECISION, LARGEST = 1.01, 30.0
 
 
 def faster(name: str, times: int) -> Scenario:
-    """A path of the catalogue at so many times its speed."""
+    """A path of the catalogue at a multiple of its speed."""
     scenario = scenarios.get(name)
     trajectory: Any = scenario.trajectory
     law = trajectory.time_law

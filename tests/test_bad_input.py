@@ -182,11 +182,11 @@ def test_a_class_of_ones_own_may_have_annotations_that_nobody_knows():
         weight: "Kilograms | None" = None  # noqa: F821
 
     @dataclasses.dataclass(frozen=True, eq=False)
-    class Told(Sphere):
+    class Renamed(Sphere):
         colour: typing.Annotated[float, "from 0 to 1"] = 0.5
         nothing: None = None
 
-    for kind in (Heavy, Told):
+    for kind in (Heavy, Renamed):
         assert kind("a", [0, 0, 0], 1).radius == 1.0
         with pytest.raises(IkgymError, match="radius"):
             kind("a", [0, 0, 0], -1.0)

@@ -1,4 +1,4 @@
-"""The table of contexts: what is trained plays, and gaps are those between the best filter and the one that is told."""
+"""The table of contexts: what is trained plays, and gaps are those between the best filter and `told`."""
 
 import json
 

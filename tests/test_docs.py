@@ -42,7 +42,7 @@ def test_every_picture_and_every_table_of_results_is_shown():
 
 
 def files() -> dict[str, str]:
-    """What the README says stands in files of one's own, by their names."""
+    """The files of the README, by their names."""
     return dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", README, re.DOTALL))
 
 
@@ -64,7 +64,7 @@ def test_readme_snippets_run(capsys, tmp_path, monkeypatch):
     assert len(snippets) == 2
     for snippet in snippets:
         assert len(statements(snippet)) <= 10
-        # For so many steps learning takes minutes.
+        # 1,600,000 steps take minutes.
         exec(snippet.replace("envs).learn(1_600_000)", "envs, n_steps=8).learn(64)"), {})
     printed = capsys.readouterr().out
     assert snippets[1].count("envs).learn(1_600_000)") == 1
@@ -74,7 +74,7 @@ def test_readme_snippets_run(capsys, tmp_path, monkeypatch):
     assert cost == pytest.approx(cells("varga7-fast")["dls"]["total cost"], rel=1e-3)
 
 
-#: What holds after the snippets of a page have run one after the other, in a folder of their own.
+#: What holds after the snippets of a page have run one after the other, in an empty folder.
 SNIPPETS: dict[str, str] = {
     "scenarios.md": "converged and len(greedy) == len(problem.positions) and driven.duration == found.duration and "
     "np.allclose(arm.forward(q)[1], position + [0.1, 0.2, -0.1], atol=1e-9) and "
@@ -149,7 +149,7 @@ def test_commands_of_the_documentation_exist():
         assert max(word) in {*cli.COMMANDS}
 
 
-#: What stands for ``ikgym WORD`` where Python runs a module or a file.
+#: Other forms of ``ikgym WORD``, where Python runs a module or a file.
 OTHERWISE = {
     "python -m baselines.optimum": "ikgym oracle",
     "python -m baselines.": "ikgym ",

@@ -193,7 +193,7 @@ def test_seeds(seed):
     assert identical(first, b.reset(seed=seed))
     assert not identical(first, b.reset(seed=seed + 1))
     np.testing.assert_array_equal(first[0]["nominal"], a.scenario.nominal(seed, 2)[1:3])
-    # Without a seed the generator goes on: another episode, but the same one in both.
+    # Without a seed the generator continues: another episode, but the same one in both.
     b.reset(seed=seed)
     second = a.reset()
     assert not identical(first, second)

@@ -1,4 +1,4 @@
-"""The tables of results can be measured again from their own lines."""
+"""The tables of results can be measured again from their lines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_the_policies_of_a_line(tmp_path, monkeypatch):
 
 @pytest.fixture
 def table(tmp_path, monkeypatch):
-    """Writes a table into an own folder."""
+    """Writes a table into a temporary folder."""
     for name in ("RESULTS", "WORK"):
         monkeypatch.setattr(keeping, name, tmp_path)
     monkeypatch.setattr(measure, "RUNS", tmp_path)

@@ -34,7 +34,7 @@ def scenario_of(name):
 
 
 def check(scenario, count):
-    """Moves arms until they have made so many steps; returns their lowest distance and how often one was stopped."""
+    """Moves arms for a number of steps; returns their lowest distance and how often one was stopped."""
     lowest, moved, stops, walk = np.inf, 0, 0, Walk(scenario)
     judge = Judge(scenario)
     while moved < count:

@@ -44,7 +44,7 @@ def test_single_and_vector_environments_draw_the_same_boxes():
 
 
 def test_other_draws_stay_as_they_are():
-    """The boxes have a stream of their own."""
+    """The boxes have a separate stream."""
     without = SCENARIO.replace(obstacles=())
     assert identical(SCENARIO.nominal(3), without.nominal(3))
     assert not identical(SCENARIO.obstacles_of(3)[0].position, SCENARIO.obstacles_of(4)[0].position)

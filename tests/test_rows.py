@@ -1,4 +1,4 @@
-"""`get_attr` and `spec`, as Gymnasium's own environments have them."""
+"""`get_attr` and `spec`, as Gymnasium's environments have them."""
 
 import gymnasium as gym
 import numpy as np

@@ -168,7 +168,7 @@ def test_attributes_of_rows():
 
 
 def test_evaluate_policy():
-    """Without a warning, and with the environment's own rewards behind a wrapper that changes them."""
+    """Without a warning, and with the environment's rewards behind a wrapper that changes them."""
     scenario = noisy(steps=5)
     policy = baselines.make("dls", scenario)
     ours = RedundantIKVecEnv(2, scenario, policy.preview)

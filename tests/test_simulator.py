@@ -25,7 +25,7 @@ ROWS = 9
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wanderer(Trajectory):
-    """A user's own random trajectory: of another kind each time, and without orientation."""
+    """A user's random trajectory: of another kind each time, and without orientation."""
 
     random: typing.ClassVar[bool] = True
     has_orientation: typing.ClassVar[bool] = False

@@ -21,7 +21,7 @@ SOLIDS = {
 
 
 def distance(size, points):
-    """Signed distance of points from a solid in its own frame."""
+    """Signed distance of points from a solid in its frame."""
     beyond = np.abs(points) - size[:3]
     return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0) - size[3]
 

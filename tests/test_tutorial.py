@@ -1,4 +1,4 @@
-"""The tutorials: all of them are run, each in a folder of its own, and print what their pages say."""
+"""The tutorials: all of them are run, each in an empty folder, and print what their pages say."""
 
 from __future__ import annotations
 

@@ -215,7 +215,7 @@ def agent_at(path: str | os.PathLike[str], digits: str | None) -> AgentFile:
     """The agent of a file.
 
     Args:
-        path: The file; ``~`` stands for the home of the user.
+        path: The file; ``~`` is the home of the user.
         digits: The first digits of its hash; None for any.
 
     Raises:

@@ -107,7 +107,7 @@ class Controller:
         self.reset()
 
     def reset(self) -> None:
-        """Begins anew: the memory is cleared, the arm stands, and no guard has stopped it."""
+        """Begins anew: the memory is cleared, the arm is at rest, and no guard has stopped it."""
         n = self._joints
         self._state: Memory | None = None
         self._stopped: StopReason | None = None
@@ -140,7 +140,7 @@ class Controller:
                 of the first command start from them, those of later ones from the command before, in the policy as
                 well. Policies without acceleration limits are shown them in each period. Shape (n,).
             q_age: Control periods since q was measured.
-            pose_age: The same of the pose.
+            pose_age: Age of the pose, in periods.
             obstacles: The obstacles as they will be at the end of this period, in the order of the scenario's, where
                 those move or are drawn: :mod:`ikgym.obstacles`, or rows as in the observation of the environment, of
                 shape (o, 16).
@@ -190,7 +190,7 @@ class Controller:
         return self._braked()
 
     def warm_up(self, calls: int = WARM_UP) -> Timing:
-        """Compiles, and plays the scenario's own reference on a perfect arm; then begins anew.
+        """Compiles, and plays the scenario's reference on a perfect arm; then begins anew.
 
         Warns where the policy does not keep the control period.
 

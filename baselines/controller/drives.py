@@ -147,7 +147,7 @@ def policy_for(
     that has ``predicted`` in it is not wrapped again. The arguments are those of :class:`Controller`.
 
     Raises:
-        InvalidInputError: The drives are neither, or told twice; or the policy is none, belongs to another scenario, or
+        InvalidInputError: The drives are neither, or given twice; or the policy is none, or is of another scenario, or
             has no name by which it could be made anew.
         UnknownNameError: There is no such policy, or parameter of it.
     """

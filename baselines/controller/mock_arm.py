@@ -164,7 +164,7 @@ class ArmInterface:
 
 
 class MockArm:
-    """An arm at the other end of a connection: a process of its own that keeps its period, whatever its user does.
+    """An arm at the other end of a connection: a separate process that keeps its period, whatever its user does.
 
     >>> with MockArm("panda-circle") as arm:
     ...     state = arm.read()

@@ -86,7 +86,7 @@ class Row:
         ideal: Fingerprint of the scenario with an ideal plant; that of the scenario if the plant is ideal.
         acceleration_stated: Whether each joint has an acceleration limit, or the arm has no limits at all.
         path_time: With free timing, the time in [s] in which the end of the path was reached; None if it was not.
-        path_position_error: With free timing, the largest distance from the reference at the policy's own progress, in
+        path_position_error: With free timing, the largest distance from the reference at the progress of the policy, in
             [m], to the end of the path; None without.
         path_orientation_error: Likewise, in [rad].
         clearance_min: Smallest distance between bodies until a stop, in [m]; None, like the rest, without collisions.

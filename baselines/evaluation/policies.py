@@ -24,7 +24,7 @@ from ikgym.validation import known_names
 if TYPE_CHECKING:
     from baselines.evaluation.foreign import Predictor, Wrap
 
-#: Stands for all registered policies, or all scenarios.
+#: All registered policies, or all scenarios.
 ALL: Final = "all"
 
 #: A policy in any form that :func:`specifications` accepts.

@@ -36,7 +36,7 @@ def ranking(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
     """The table of policies, see :func:`baselines.evaluation.summary.rank`.
 
     Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
-    the largest distance from the reference at the policy's own progress, or on the clock of the others. Where a
+    the largest distance from the reference at the progress of the policy, or on the clock of the others. Where a
     scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
     """
     lines = rank(rows, policies)

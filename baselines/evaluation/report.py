@@ -25,7 +25,7 @@ STOP_NOTE = "† a joint was at a stop, a limit of its coordinate"
 STATED_NOTE = "§ no acceleration limit stated for some joint: the peak is the one that occurred"
 TIMING_NOTE = (
     "‡ free timing: slower where limits bind; path time: when the end of the path was reached, – if it was not; path "
-    "err: largest distance from the reference at the policy's own progress; all else is on the clock of the scenario"
+    "err: largest distance from the reference at the progress of the policy; all else is on the clock of the scenario"
 )
 RATIO_NOTE = "cost ratio: total cost / best known cost, – where none is known"
 TIMES_NOTE = "p50, p99: time of a call after the first; misses: such calls longer than Δt"

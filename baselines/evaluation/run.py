@@ -58,12 +58,12 @@ def evaluate(
     scenario is skipped there, and listed in the result.
 
     Args:
-        scenarios: Scenarios, their names, ``"file.toml"`` or ``"package.module:attribute"``; ``"all"`` stands for all
+        scenarios: Scenarios, their names, ``"file.toml"`` or ``"package.module:attribute"``; ``"all"`` means all
             registered scenarios.
         policies: Names, names with parameters such as ``"dls:damping=1e-2"``, or pairs such as
             ``("dls", {"damping": 1e-2})``; ``"agent:PATH"`` for an agent in a file; classes and instances of
             :class:`baselines.SolverPolicy`; any object or class with the `predict` of Stable-Baselines3;
-            ``"package.module:Class"`` for one of those; ``"all"`` stands for all registered policies. A class or
+            ``"package.module:Class"`` for one of those; ``"all"`` means all registered policies. A class or
             function that requires an argument receives the scenario. A policy that is no
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.

@@ -92,7 +92,7 @@ def _columns() -> Iterable[Column]:
     yield Column("steps_at_acceleration_limit", "at q̈ limit", "", limit, how="sum", format=count)
     about = "when the end of the path was reached, with free timing"
     yield Column("path_time_s", "path time", "[s]", about, of="path_time", how=_largest)
-    about = "largest distance from the reference at the policy's own progress, with free timing"
+    about = "largest distance from the reference at the progress of the policy, with free timing"
     yield Column("path_error_mm", "path err", "[mm]", about, of="path_position_error", how=_largest_in_thousandths)
     about = "smallest distance between bodies"
     yield Column("clearance_mm", "clearance", "[mm]", about, of="clearance_min", how=lambda values: 1e3 * values.min())
@@ -347,7 +347,7 @@ def _defaults(policy: str) -> dict[str, Any]:
         fields = dataclasses.fields(registry.get(policy))
     except IkgymError:  # of a policy that is not known here
         return {}
-    # None often stands for a value that the policy works out itself.
+    # None is often a value that the policy works out itself.
     return {f.name: f.default for f in fields if f.default is not dataclasses.MISSING and f.default is not None}
 
 

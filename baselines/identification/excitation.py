@@ -10,7 +10,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray, number
 
-#: The motion repeats itself after so many seconds. Highest frequency in parts of the control rate, and how many
+#: Period of the motion in [s]. Highest frequency in parts of the control rate, and how many
 #: frequencies there are for each joint.
 REPEAT, HIGHEST, SINES = 5.0, 0.4, 28
 #: Draws of phases, of which those with the lowest peak of acceleration are taken.

@@ -152,7 +152,7 @@ def _coarse(part: Part, constant: float, lowest: int, longest: int, where: Float
 
 
 def _refined(part: Part, whole: int, guess: float, where: FloatArray) -> tuple[float, int, float]:
-    """The same of a whole delay, with the next one beside it, around a guess of the time constant."""
+    """Residuals of a whole delay and the next one, around a guess of the time constant."""
     none = _taps(part, whole, 0.0, where)[1]
     middle = math.log(max(guess, FASTEST))
     found = minimize_scalar(

@@ -19,7 +19,7 @@ from ikgym.validation import FloatArray
 SHORTEST, MOST_ROWS = 4.0, 2_000_000
 #: The longest control period in [s].
 SLOWEST = 0.1
-#: Intervals between rows may differ from the control period by this share; so many of them may, as jitter.
+#: Intervals between rows may differ from the control period by this share; this share of them may, as jitter.
 JITTER, RARE = 0.3, 0.02
 #: Joint coordinates may be outside the limits by this much in [rad] or [m], as encoders and stops are not exact.
 OUTSIDE = 0.2

@@ -142,7 +142,7 @@ class Identified:
             raise InvalidInputError(f"Cannot write {file}: {error}.") from None
 
     def plot(self, file: pathlib.Path) -> None:
-        """Draws measured beside simulated velocities of each joint, in the most excited two seconds."""
+        """Draws measured and simulated velocities of each joint, in the most excited two seconds."""
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(9.0, 1.7 * len(self.joints)), layout="constrained")
@@ -209,7 +209,7 @@ def _precedes(log: Log, arm: Arm, joint: Joint) -> bool:
 
 
 def _check_pairs(log: Log, arm: Arm) -> None:
-    """Checks that each joint follows its own command, not that of another one."""
+    """Checks that each joint follows its command, not that of another one."""
     parts = [Part(log, j) for j in range(arm.joints)]
     late = round(0.02 / log.period)
     u = np.stack([part.late(late) for part in parts])

@@ -81,7 +81,7 @@ class Scored(Protocol):
 def lookup(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Record | None:
     """The record of an episode; None where there is none, or it is of another content than the episode now has.
 
-    ``arm_seed`` says which arm moves; the seed's own if left out.
+    ``arm_seed`` says which arm moves; that of the seed if left out.
     """
     return _lookup(stripped(scenario, seed, arm_seed), seed)
 

@@ -52,7 +52,7 @@ def solve(
         scenario: The tracking problem, or its name.
         seed: The reset seed.
         how: How thoroughly is searched.
-        arm_seed: Which arm moves; the seed's own if left out.
+        arm_seed: Which arm moves; that of the seed if left out.
         cached: Whether to look on disk first, and to keep the result there.
         tick: Called now and then with the share of the work done since the last call.
         paths: Joint coordinates after each step by name, further starts, with which the disk is left alone.

@@ -30,7 +30,7 @@ CLEARANCE = 1e-4
 class EpisodeProblem:
     """An episode from its start to its end, as the kernels of :mod:`baselines.solvers.receding_horizon.newton` see it.
 
-    A knot stands at each step that counts. Where a nominal point is held for h > 1 steps the arm moves in h - 1 of
+    Each step that counts has a knot. Where a nominal point is held for h > 1 steps the arm moves in h - 1 of
     them, which cost nothing, and rests in the last, which counts.
 
     Args:
@@ -64,7 +64,7 @@ class EpisodeProblem:
         if scenario.plant != Plant(**payload):
             raise InvalidInputError(
                 "The best cost of an episode is that of a joint path of the arm in the data sheet; scenario "
-                f"{scenario.name!r}: expected an ideal plant, but for a payload, got {scenario.plant}."
+                f"{scenario.name!r}: expected an ideal plant, except a payload, got {scenario.plant}."
             )
         if scenario.proximity is not None:
             raise InvalidInputError(

@@ -25,7 +25,7 @@ class Search(Frozen):
 
     Args:
         starts: Random starts, on a coarse time grid; at most 100 000.
-        chains: Paths that the local search goes on with, the best of all starts.
+        chains: Paths that the local search continues with, the best of all starts.
         generations: How often these learn of each other's progress; 0 leaves the local search out.
         rounds: Branches of each path in a generation.
         polished: Paths that are polished at full resolution, besides those that are known there.
@@ -122,7 +122,7 @@ class Optimum(Frozen):
         return out
 
     def record(self) -> Record:
-        """As it stands among the best known costs."""
+        """As a record of the best known costs."""
         return Record(self.scenario, self.seed, self.cost, self.found_by, self.gradient_norm, self.spread, self.hash)
 
     def _reached(self, start: Start) -> bool:

@@ -23,7 +23,7 @@ class Oracle(PrivilegedPath):
     """Plays the optimum of its episode, see :func:`baselines.oracle.solve`.
 
     A reference, not a contender: it knows the whole trajectory and the arm itself, solves the episode when it is first
-    asked (or looks the solution up on disk), and has no other start than the episode's own in mind. It plays
+    asked (or looks the solution up on disk), and knows only the start of the episode. It plays
     the best path that the search has found; nobody certifies that there is none better.
 
     Args:

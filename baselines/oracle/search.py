@@ -61,7 +61,7 @@ def search(
     known = {name: episode.feasible(path) for name, path in known.items()}
     starts, fine = [Start(kind) for kind in known], dict(enumerate(known.values()))
     done(0.1)
-    # Where no velocity costs, as with held points, each knot is a problem of its own: nothing to search for.
+    # Where no velocity costs, as with held points, each knot is a separate problem: nothing to search for.
     if episode.grid.velocity.any():
         starts, found = _coarse_search(episode, how, known, done)
         fine |= found

@@ -20,7 +20,7 @@ def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scen
     """The scenario in which the arm of one episode moves, ideally driven and measured.
 
     Of the plant nothing is left but the payload, which the arm takes up on the way; a scenario whose plant is ideal
-    stays as it is. ``arm_seed`` says which arm moves; the seed's own if left out.
+    stays as it is. ``arm_seed`` says which arm moves; that of the seed if left out.
 
     Raises:
         InvalidInputError: There is an arm_seed, and nothing that it could choose.

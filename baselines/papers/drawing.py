@@ -24,7 +24,7 @@ class Curve(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Curves over one pair of axes; labels have units, and that of the abscissa always stands in the lowest row."""
+    """Curves over one pair of axes; labels have units, and that of the abscissa is always in the lowest row."""
 
     ylabel: str
     curves: Sequence[Curve]
@@ -49,7 +49,7 @@ def compared(
 
 
 def picture(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 2.1) -> Figure:
-    """Panels in rows of so many columns and a height in [in], with one legend for all."""
+    """Panels in rows of a number of columns and a height in [in], with one legend for all."""
     rows = -(-len(panels) // columns)
     drawn = style.figure(0.8 + height * rows)
     grid = drawn.add_gridspec(rows, columns)

@@ -123,7 +123,7 @@ class Paper:
 
 
 def claims_of(*modules: ModuleType) -> tuple[Claim, ...]:
-    """The claims of ``claims.toml`` beside some modules, each tested by the function of the same name."""
+    """The claims of ``claims.toml`` next to some modules, each tested by the function of the same name."""
     text = pathlib.Path(str(modules[0].__file__)).with_name("claims.toml").read_text(encoding="utf-8")
     tests = {name: value for module in modules for name, value in vars(module).items()}
     return tuple(Claim(name, test=tests[name], **record) for name, record in tomllib.loads(text).items())

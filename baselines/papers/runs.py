@@ -21,7 +21,7 @@ class Runs:
     """Plays episodes on demand, and keeps them.
 
     Args:
-        steps: Most steps of an episode, for trials; the scenarios' own if left out.
+        steps: Most steps of an episode, for trials; those of the scenarios if left out.
         progress: Whether to show a bar on stderr while an episode is played.
     """
 

@@ -43,7 +43,7 @@ class Motion:
     clearance: FloatArray
     # the closest pair, and the one that touched at a stop; -1 where nothing can meet. Shape (k, N, 2)
     pair: npt.NDArray[np.int64]
-    stopped: FloatArray  # 1 where bodies have touched and the arm stands still. Shape (k, N)
+    stopped: FloatArray  # 1 where bodies have touched and the arm is at rest. Shape (k, N)
 
     def of(self, row: int) -> Motion:
         """The motion from one of the starts."""
@@ -52,7 +52,7 @@ class Motion:
 
 
 def path_duration(scenario: Scenario) -> float:
-    """The time that the path takes, or the episode where the path goes on for ever, in [s]."""
+    """The time that the path takes, or the episode where the path has no end, in [s]."""
     if scenario.random:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     ends = duration(scenario.trajectory)

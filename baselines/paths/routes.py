@@ -21,8 +21,8 @@ from ikgym.validation import BoolArray, FloatArray, float_array, per_joint
 #: Joint motions aside from the task, as shares of the largest ones that are allowed, and how many random directions
 #: they have in null spaces of several dimensions.
 ASIDE, DIRECTIONS = np.linspace(-0.98, 0.98, 5), 3
-#: To first order a motion may be so many times the largest one: waypoints can be 10° apart. If it is still too large
-#: when the pose is met, it is corrected along the null space so many times.
+#: To first order a motion may be this multiple of the largest one: waypoints can be 10° apart. If it is still too large
+#: when the pose is met, it is corrected along the null space, this number of times.
 FIRST_ORDER, CORRECTIONS = 1.3, 2
 #: Share of the largest motion that is used, and distance in [m] and angle in [rad] within which a pose is met.
 USED, TOLERANCE = 0.999, 1e-9

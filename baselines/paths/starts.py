@@ -21,7 +21,7 @@ SETTLING, PERIOD = 12.0, 0.1
 
 
 def starts(scenario: Scenario) -> FloatArray:
-    """Joint coordinates at the first pose of a path, one a branch, the scenario's own first; shape (N, n).
+    """Joint coordinates at the first pose of a path, one a branch, that of the scenario first; shape (N, n).
 
     Most of them are where `qp` leads redundant joints while the pose is held, so that they are at rest when the path
     begins; few others are not. Where the scenario has collisions, all of them are clear.
@@ -43,7 +43,7 @@ def starts(scenario: Scenario) -> FloatArray:
 
 
 def _clear(scenario: Scenario, own: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Those that touch nothing of the scenario's own start, of shape (1, n), and of others, of shape (k, n)."""
+    """Those that touch nothing: the scenario's start, of shape (1, n), and of others, of shape (k, n)."""
     every = np.vstack([own, found])
     pairs = closest(scenario.arm, every, scenario.obstacle_rows(1), scenario.surroundings.checked)
     clear = pairs.distances > 0.0

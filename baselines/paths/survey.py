@@ -23,12 +23,12 @@ REACHED = 1e-3, 1e-3
 FOLLOWED = 5e-5, 5e-4
 #: Shares of the limits of velocity and acceleration that a timing uses.
 USED = 0.985, 0.96
-#: The path is played in the time asked for, and where most branches miss poses, in so many times the time: as slowly as
+#: The path is played in the time asked for, and where most branches miss poses, slowed by this factor: as slowly as
 #: can be, then slower and slower until half of the branches reach all of it.
 SLOWEST, SLOWER = 30.0, (1.6, 2.5, 4.0, 6.5, 10.0, 16.0)
 #: Steps of a slower play: a longer path is sampled at larger intervals, a shorter one at smaller ones.
 FEWEST_STEPS, MOST_STEPS = 1000, 4000
-#: Timings that take at most so many times the requested time count as the same. Joints nearer to a stop than the first
+#: Timings that take at most this multiple of the requested time count as equal. Joints nearer to a stop than the first
 #: of these distances, in [rad] or [m], are braked by it; more than the second is no better. A motion leaps that begins
 #: with more than the last share of a velocity limit, where accelerations are not limited.
 SLOWING, NARROW, ENOUGH, LEAP = 1.02, 0.02, 0.8, 0.1
@@ -66,7 +66,7 @@ class Branch:
         position_error: The largest in [m].
         orientation_error: The largest in [rad]; 0 where the task has no orientation.
         velocity: The largest joint velocities, were this motion as fast as asked, in [rad/s] or [m/s]. Shape (n,).
-        acceleration: The same of accelerations, in [rad/s²] or [m/s²]. Shape (n,).
+        acceleration: Shares of the acceleration limits, in [rad/s²] or [m/s²]. Shape (n,).
         leap: The largest share of a velocity limit in the first control period, from rest.
         room: The least distance of each joint from its stops in [rad] or [m], inf where there is none. Shape (n,).
         contact: How close bodies come; None where nothing can meet.
@@ -204,7 +204,7 @@ def survey(
 ) -> Survey:
     """Follows a path from several start branches, and times each of them.
 
-    Branches are postures at the first pose: the scenario's own start, and others from random postures. From each of
+    Branches are postures at the first pose: that of the scenario, and others from random postures. From each of
     them `qp` plays the path in the time asked for and, while it misses poses, slower, obstacles with it. Where the
     scenario has collisions, branches begin clear, and end where bodies touch.
 
@@ -248,7 +248,7 @@ def _play_again(scenario: Scenario, branches: list[Branch], chosen: list[bool], 
 
 
 def _branches(scenario: Scenario, starts: FloatArray, slowing: float, solver: str) -> list[Branch]:
-    """Branches from starts of shape (N, n), played in so many times the time that is asked for."""
+    """Branches from starts of shape (N, n), played in a multiple of the requested time."""
     timing = Timing.uniform(path_duration(scenario), slowing)
     dt = timing.duration / min(max(timing.duration / scenario.dt, FEWEST_STEPS), MOST_STEPS)
     motion = played(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts, solver)
@@ -285,7 +285,7 @@ def branch_of(scenario: Scenario, motion: Motion, timing: Timing) -> Branch:
 
 
 def _contact(scenario: Scenario, motion: Motion, slowing: float) -> Contact | None:
-    """How close bodies come in the motion of one start, played in so many times the time that is asked for."""
+    """How close bodies come in the motion of one start, played in a multiple of the requested time."""
     if motion.pair[0, 0, 0] < 0:
         return None
     stops = np.flatnonzero(motion.stopped[:, 0])

@@ -16,7 +16,7 @@ from ikgym.validation import FloatArray
 POINTS = 300
 #: No limit, in terms of the velocity limit: reached within this time in [s].
 AT_ONCE = 1e-5
-#: A rest at both ends lets the rate grow without bounds there; it is at most so many times the average one.
+#: A rest at both ends lets the rate grow without bounds there; its largest multiple of the average one.
 FASTEST = 6.0
 #: In which time in [s] a motion that leaves a reserve gets up to speed, which takes half of it, and points in it. The
 #: control loop begins late by the delay and lag of the drives, which it does not know yet.
@@ -33,7 +33,7 @@ class Timing:
 
     @classmethod
     def uniform(cls, duration: float, factor: float) -> Timing:
-        """So many times the duration in [s], everywhere alike."""
+        """This timing's duration in [s] times a factor, everywhere alike."""
         ends = np.array([0.0, duration])
         return cls(factor * ends, ends, np.full(2, 1.0 / factor))
 
@@ -43,7 +43,7 @@ class Timing:
         return float(self.times[-1])
 
     def slower(self, factor: float) -> Timing:
-        """The same in so many times the time."""
+        """This timing, slowed by a factor."""
         return Timing(self.times * factor, self.progress, self.rates / factor)
 
     def eased_in(self) -> Timing:
@@ -81,7 +81,7 @@ def shortest(
     dt: float,
     rate: float = np.inf,
 ) -> Timing | None:
-    """The shortest timing of a joint path; None where there is none, as where a joint moves and time stands still.
+    """The shortest timing of a joint path; None where there is none, as where a joint moves in no time.
 
     Args:
         progress: Times of a trajectory in [s], rising from 0. Shape (k,).

@@ -131,7 +131,7 @@ class APG(Frozen):
     reset_distance: _Number = 0.3
     """Arms farther from their reference position than this, in [m], are put back on the reference path."""
     reset_distance_end: _Number = 1.0
-    """The same in the segments of the last window, in which the agent learns to come back from farther away."""
+    """Displacement in the segments of the last window, in which the agent learns to come back from farther away."""
     averaging: _Share = 0.99
     """Factor of the exponential moving average of the weights, which is the agent."""
     init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None

@@ -26,7 +26,7 @@ PAGES = {
 def public_names(module: ModuleType) -> list[str]:
     """Its classes and functions: those of ``__all__``, or those that it defines.
 
-    A class that another listed module has as well stands there alone.
+    A class is described once.
     """
     own = getattr(module, "__all__", None) or [n for n, x in vars(module).items() if _of(x) == module.__name__]
     return [name for name in own if not name.startswith("_") and _described(getattr(module, name))]

@@ -74,7 +74,7 @@ class Draws:
         self._ranges = Ranges(low.copy(), high.copy(), whole, streams, *plant.from_middle)
 
     def blank(self, rows: int) -> Arms:
-        """Empty arrays for so many arms."""
+        """Empty arrays for N arms."""
         n = self._arm.joints
         return Arms(
             np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, n, 3)), np.zeros((rows, 2, 3)), np.zeros((rows, 2, 3, 3))

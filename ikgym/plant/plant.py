@@ -34,7 +34,7 @@ DELAYS = ("q_delay", "pose_delay")
 class Plant(Frozen):
     """Deviations of kinematics, drives and sensors from the data sheet. All are off by default.
 
-    Noises and missing poses are drawn at each step, all other random values once an episode. Each effect has its own
+    Noises and missing poses are drawn at each step, all other random values once an episode. Each effect has a separate
     stream of random numbers, so that switching one on shifts no other; normal numbers are cut at 6 standard deviations.
     Policies see the measurements, never the values of :meth:`ikgym.Scenario.drawn_plant`.
 
@@ -69,7 +69,7 @@ class Plant(Frozen):
         load: Factor of `payload`. A number, or a range.
         bandwidth: Bandwidth f of a first-order velocity loop, in [Hz]: a step closes the share 1 − exp(−2π f Δt) of the
             gap to the commanded velocity. A number, inf for none, one a joint, or a range.
-        command_delay: Steps after which a command reaches the drive, which stands still before. A number or one a
+        command_delay: Steps after which a command reaches the drive, which is at rest before. A number or one a
             joint, of which fractions interpolate between two commands; or a range of whole numbers.
         drive: A drive of low order: v(k) = a₁ v(k-1) + a₂ v(k-2) + a₃ v(k-3) + b₀ u(k) + … + b₃ u(k-3) is the velocity
             in the step k, u the command as it leaves the lag. The numbers (a₁, a₂, a₃, b₀, b₁, b₂, b₃), or such a row a

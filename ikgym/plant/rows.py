@@ -33,7 +33,7 @@ def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[in
     """Seeds of arms, chosen by the user.
 
     Args:
-        given: A whole number for all rows, or one a row, where None stands for an arm that is drawn with the episode.
+        given: A whole number for all rows, or one a row, where None is an arm that is drawn with the episode.
         rows: N.
         plant: The plant of the scenario.
         name: Name of the scenario.
@@ -216,5 +216,5 @@ class PlantRows:
 
 
 def noise_key(key: int, noise_seed: int) -> int:
-    """The key of an episode's noises: its own, or that of a stream far from those of its effects."""
+    """The key of an episode's noises: that of the episode, or that of a stream far from those of its effects."""
     return key if noise_seed == 0 else int(stream(np.uint64(key), NOISE_SEEDS + noise_seed))

@@ -46,7 +46,7 @@ def drives(values: Mapping[str, Any], severity: float) -> dict[str, Any]:
 def whole(value: Any, factor: float, least: int = 0) -> Any:
     """A whole number, or each of a tuple of them, with its excess over the least one times a factor, rounded.
 
-    Numbers with a fraction stay unrounded, as do those beside them.
+    Numbers with a fraction stay unrounded, as do those next to them.
     """
     if np.any(np.mod(value, 1.0)):
         return scaled(value, factor, least)

@@ -6,7 +6,7 @@
   and robust Cartesian path planning*, ICRA 2024). Arms ``fetch_arm``, ``fetch`` and ``panda``.
 
 Taken from RL-ITG at commit 0866661f83c09e9f5a20adbdbdadeb120d80a703 and cppflow at
-c92e0a45aeee257a9a489b49cf83370193fe5844, whose licences are beside this file: the problems without obstacles, except
+c92e0a45aeee257a9a489b49cf83370193fe5844, whose licences are next to this file: the problems without obstacles, except
 `hello_mini`, the beginning of `hello`. Poses are published in the frame of `torso_lift_link`, which is parallel to
 `base_link`; here they are in the base frame of the arm. The i-th start of a random path belongs to its i-th waypoint,
 so only the first one is kept. Initial trajectories are those from the first start; `reinforcement` is the published

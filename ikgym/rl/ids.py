@@ -117,7 +117,7 @@ class TrackEnv(TaskEnv):
     Truncated after 200 steps; terminated where the tool is more than 0.1 m off.
 
     ## Score
-    :func:`ikgym.rl.score` of the costs of whole episodes: 0 is an arm that stands still, 1 is tuned `dls`.
+    :func:`ikgym.rl.score` of the costs of whole episodes: 0 is an arm at rest, 1 is tuned `dls`.
     """
 
     task = Task()

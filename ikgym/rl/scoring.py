@@ -1,4 +1,4 @@
-"""Scores of agents in the environments by id: 0 is an arm that stands still, 1 is tuned damped least squares."""
+"""Scores of agents in the environments by id: 0 is an arm at rest, 1 is tuned damped least squares."""
 
 from __future__ import annotations
 

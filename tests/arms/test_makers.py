@@ -1,4 +1,4 @@
-"""The arms of makers beside what Pinocchio reads in the files that describe them, which `golden/write.py` wrote.
+"""The arms of makers compared with what Pinocchio reads in the files that describe them, which `golden/write.py` wrote.
 
 `golden/balls.json` is from github.com/platonics-delft/kinematics_calibration: the ball at the end of five calibrated
 Pandas in the frame of the flange, eight recorded postures with the ball in one socket, and the positions of the ball

@@ -1,4 +1,4 @@
-"""Bodies from the collision geometry of URDF files, beside Pinocchio's placements of the same geometry."""
+"""Bodies from the collision geometry of URDF files, compared with Pinocchio's placements of the same geometry."""
 
 import logging
 from pathlib import Path

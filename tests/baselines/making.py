@@ -18,7 +18,7 @@ def usual(name):
     return "zhang6-lspb" if get(name).rival else "varga7-fast"
 
 
-#: A short search: a contract asks for some path, what a thorough one finds is for the oracle's own tests.
+#: A short search: a contract asks for some path, what a thorough one finds is for the tests of the oracle.
 SHORT = {"oracle": {"starts": 4, "generations": 1}}
 
 

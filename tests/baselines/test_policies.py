@@ -43,9 +43,9 @@ STEPS = 6
 #: A task that no scenario of the catalogue has.
 AXIS = ikgym.scenarios.get("zhang6-lspb").replace(name="zhang6-axis", task=ikgym.tasks.get("axis"))
 
-#: Beside the usual scenario one for each other task, and for each kind of limits.
+#: The usual scenario, and one for each other task, and for each kind of limits.
 SCENARIOS = ("zhang3-helix", "khan8-q7q8", "tiago-raster", AXIS.name)
-#: What a policy is told of a scenario.
+#: What a policy knows of a scenario.
 PROBLEM = {"model", "task", "cost", "dt", "jerk_limit", "velocity_limit", "surroundings", "obstacles_shown"}
 every_policy = pytest.mark.parametrize("name", baselines.names())
 every_contender = pytest.mark.parametrize("name", [name for name in baselines.names() if not get(name).reference])
@@ -144,8 +144,8 @@ def test_rows_that_are_shared_out_to_threads_are_the_same(monkeypatch, name):
 @every_policy
 def test_memory_has_names_and_what_is_returned_is_fresh(name):
     policy = policy_for(name, usual(name))
-    own = policy.own_memory(1) if isinstance(policy, Wrapper) else policy.memory(1)
-    assert own == () or hasattr(own, "_fields")
+    outer = policy.own_memory(1) if isinstance(policy, Wrapper) else policy.memory(1)
+    assert outer == () or hasattr(outer, "_fields")
     state, returned = None, []
     for observation in observations(usual(name), policy.preview, 2):
         action, state = policy.predict(observation, state, np.array([False, True]))
@@ -190,12 +190,12 @@ def test_any_policy_inside_smoothed(name):
     alone, policy = made(name, short), baselines.make("smoothed", short, policy=name)
     assert policy.preview == alone.preview
     assert policy.options == alone.parameters
-    own, inside = policy.split(policy.memory(3))
-    assert own._fields == ("known", "q", "qdot", "smooth")
+    outer, inside = policy.split(policy.memory(3))
+    assert outer._fields == ("known", "q", "qdot", "smooth")
     assert identical(tuple(inside), tuple(alone.initial_memory(3)))
     observation = next(observations(usual(name), policy.preview, 3))
     action, state = policy.predict(observation)
-    assert [array.shape for array in state[2:]] == [array.shape for array in (*own, *inside)]
+    assert [array.shape for array in state[2:]] == [array.shape for array in (*outer, *inside)]
     inner_state = policy.inner_state(state)
     assert identical(policy.report(state), alone.report(inner_state))
     assert identical(policy.diagnostics(state), alone.diagnostics(inner_state))
@@ -318,7 +318,7 @@ def test_policies_are_frozen_copied_and_say_their_parameters(name):
 
 
 def test_plain_python_answers_as_the_compiled_kernels_do():
-    """All compiled solvers of one step, two steps long; the receding horizons are tested beside their kernels."""
+    """All compiled solvers of one step, two steps long; the receding horizons are tested with their kernels."""
     names = [n for n in baselines.names() if issubclass(get(n), CompiledPolicy) and "receding" not in get(n).__module__]
     code = (
         "import json, warnings; warnings.simplefilter('ignore')\n"

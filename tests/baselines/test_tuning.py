@@ -39,7 +39,7 @@ def plays():
 
 @pytest.fixture(autouse=True)
 def costs(monkeypatch, request):
-    """Costs without an episode, but for tests that play; and the seeds that were asked for."""
+    """Costs without an episode, except in tests that play; and the seeds that were asked for."""
     seen = []
     real = Search.costs
 

@@ -32,9 +32,9 @@ class Halved(NamedWrapper):
         return Steps(np.zeros(rows, dtype=np.int64))
 
     def solve(self, batch, memory):
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         step = self.ask(batch, inside)
-        return self.solution(0.5 * step.qdot, Steps(own.made + 1), step)
+        return self.solution(0.5 * step.qdot, Steps(outer.made + 1), step)
 
 
 def observation(preview, rows=2):
@@ -55,8 +55,8 @@ def test_a_wrapper_of_a_few_lines(name):
         assert identical(policy.inner_state(state), inner)
         assert identical(policy.diagnostics(state), alone.diagnostics(inner))
         assert identical(policy.report(state), alone.report(inner))
-    own, _ = policy.split(policy.memory_of(state))
-    assert own.made.tolist() == [3, 1]
+    outer, _ = policy.split(policy.memory_of(state))
+    assert outer.made.tolist() == [3, 1]
 
 
 def test_what_cannot_be_inside():

@@ -1,4 +1,4 @@
-"""Limits belong to the plant: what no policy can do, and how it is told."""
+"""Limits belong to the plant: what no policy can do, and how it is reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HALF = math.log(2.0) / (2.0 * math.pi * DT)
 
 
 def one_joint(lower=-1.0, upper=1.0, velocity=2.0, acceleration=np.inf, **changes):
-    """A slide along x that starts at 0 and is told up to ±4 m/s."""
+    """A slide along x that starts at 0 with commands up to ±4 m/s."""
     arm = ikgym.Arm("slide", [[0, 0, 0]], [[1, 0, 0]], (True,), [0, 0, 0], np.eye(3), [lower], [upper])
     arm = arm.replace(velocity_limit=[velocity], acceleration_limit=[acceleration])
     still = ikgym.trajectories.Sinusoid(np.zeros(1))

@@ -1,4 +1,4 @@
-"""What an episode draws: of the right size, from streams of their own, and the same for all who ask."""
+"""What an episode draws: of the right size, from separate streams, and the same in all calls."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def arms(plant, arm=PANDA):
 
 
 def close(numbers, deviation):
-    """Whether a mean of 0 and a standard deviation are met, as nearly as so many numbers can tell."""
+    """Whether a mean of 0 and a standard deviation are met, as nearly as the number of samples allows."""
     return abs(numbers.mean()) < 0.1 * deviation and abs(numbers.std() / deviation - 1.0) < 0.06
 
 

@@ -1,4 +1,4 @@
-"""Environments for learning: what they show and reward, and one arm beside N, bit for bit."""
+"""Environments for learning: what they show and reward, and one arm against N, bit for bit."""
 
 import numpy as np
 import pytest

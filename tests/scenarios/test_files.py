@@ -154,7 +154,7 @@ def test_what_is_written_is_what_is_read(values):
 
 @pytest.fixture
 def urdf(tmp_path):
-    """A URDF file beside the folder of scenario files, and an arm from it."""
+    """A URDF file next to the folder of scenario files, and an arm from it."""
     path = tmp_path / "arms" / "two.urdf"
     path.parent.mkdir()
     path.write_text(PAIR)

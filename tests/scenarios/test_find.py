@@ -31,7 +31,7 @@ number = 3
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """The current folder, with a file and a module of the user's own."""
+    """The current folder, with a file and a module of the user."""
     monkeypatch.chdir(tmp_path)
     FAST.replace(name="short", steps=3).save("short.toml")
     (tmp_path / "my_scenarios.py").write_text(MODULE)

@@ -1,4 +1,4 @@
-"""What docs/scenarios.md says of scenarios of one's own holds."""
+"""What docs/scenarios.md says of scenarios in files holds."""
 
 import dataclasses
 import re

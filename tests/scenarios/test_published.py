@@ -62,7 +62,7 @@ def test_the_waypoints_are_met_at_their_steps_from_a_clear_start_on(name):
 
 
 def test_the_panda_ends_at_its_hand():
-    """`panda_hand` stands on the flange, turned by -45° about its z axis (franka_description)."""
+    """`panda_hand` is mounted on the flange, turned by -45° about its z axis (franka_description)."""
     flange, hand = ikgym.arms.get("panda"), scenarios.get("cppflow-panda-square").arm
     rotation, position = flange.forward(flange.home)
     turned, there = hand.forward(flange.home)

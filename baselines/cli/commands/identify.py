@@ -28,7 +28,7 @@ class Options:
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Writes the plant (.toml), or with --excite the motion (.csv)."""
     plot: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draws measured beside simulated velocities (.png, .pdf or .svg)."""
+    """Draws measured and simulated velocities (.png, .pdf or .svg)."""
     test: Annotated[str | None, tyro.conf.arg(metavar="LOG")] = None
     """A second log, on which the fit is tested."""
     excite: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")] = None

@@ -91,7 +91,7 @@ def manual() -> str:
     return f"""\
 Trains agents: networks from observations to joint velocities. apg differentiates the cost through the arm in any
 scenario; ppo, sac and td3 are those of Stable-Baselines3 and recurrent_ppo is that of sb3-contrib, unmodified, in an
-environment by id. Each method has its own options: {prog} METHOD --help
+environment by id. Each method has options: {prog} METHOD --help
 
 {shell.listing("Methods", METHODS)}
 

@@ -224,7 +224,7 @@ def no_inversion(runs: Runs) -> Finding:
 
 
 def _compensates(runs: Runs, error: str, unit: str) -> Finding:
-    """Errors beside those of the exact arm that is driven by the model's joint coordinates."""
+    """Errors compared with those of the exact arm that is driven by the model's joint coordinates."""
     holds, figures = dict[str, bool](), dict[str, list[float]]()
     for name, path in PATHS.items():
         scenario = runs.scenario(path)
@@ -252,7 +252,7 @@ def compensates_orientation(runs: Runs) -> Finding:
 
 
 def precise_model(runs: Runs) -> Finding:
-    """Errors with an exact model beside those with the approximate one."""
+    """Errors with an exact model compared with those with the approximate one."""
     figures: dict[str, list[float]] = {}
     holds = True
     for name, path in PATHS.items():
@@ -281,7 +281,7 @@ def no_exploration(runs: Runs) -> Finding:
 
 
 def less_hectic(runs: Runs) -> Finding:
-    """Peak joint velocities and travel beside two closed loops."""
+    """Peak joint velocities and travel compared with two closed loops."""
     peaks = {name: peak_speed(runs.play(Q7Q8, name)) for name in (METHOD, *CLOSED_LOOPS)}
     return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"))
 

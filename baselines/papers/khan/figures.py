@@ -42,7 +42,7 @@ def _errors(title: str, points: Points, _other: Points, _nominal: FloatArray) ->
 
 
 def _joints(title: str, points: Points, other: Points, nominal: FloatArray) -> Figure:
-    """The path of each joint; with weights beside that without."""
+    """The path of each joint; with weights and without."""
     labels = [f"$q_{i + 1}$ [rad]" for i in range(points.q.shape[1])]
     panels = compared(labels, points.time, points.q, nominal, ("solution", "generated the nominal path"))
     if other is not points:

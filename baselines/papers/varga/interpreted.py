@@ -1,6 +1,6 @@
 """The printed descent, interpreted: with 4 × 4 matrices in NumPy, one forward difference after another.
 
-For times only, beside those of compiled kernels; the results are those of ``rhc_gradient``.
+For times only, compared with compiled kernels; the results are those of ``rhc_gradient``.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def ramp_errors(runs: Runs, velocity: float, damping: float, horizon: int = 1) -
 def along_the_helix(runs: Runs, policy: str, ahead: int, *, hold: bool = False, **parameters: Any) -> FloatArray:
     """Inputs of single steps from all states of example 1, the first, singular one left out. Shape (steps - 1, 3).
 
-    The policy sees so many steps ahead; with ``hold`` the first point is repeated.
+    The policy sees ``ahead`` steps; with ``hold`` the first point is repeated.
     """
     scenario, episode = runs.scenario(HELIX), predictive(runs)
     nominal, steps = scenario.nominal(preview=ahead), len(episode.q)

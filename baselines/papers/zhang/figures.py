@@ -23,7 +23,7 @@ def _samples(values: FloatArray) -> FloatArray:
 
 
 def _stack(title: str, panels: Sequence[Panel], *, columns: int = 1, height: float = 1.9) -> Figure:
-    """Panels over the sample k, which stands below the lowest."""
+    """Panels over the sample k, which is below the lowest."""
     last = len(panels) - columns
     labelled = [panel._replace(xlabel="sample k" if i >= last else "") for i, panel in enumerate(panels)]
     return picture(title, labelled, columns=columns, height=height)

@@ -1,4 +1,4 @@
-"""Zhang 2020, sections IV and V: claims on predictive control (MFAPC) beside MFAC, on both examples, and on times."""
+"""Zhang 2020, sections IV and V: claims on predictive control (MFAPC) and MFAC, on both examples, and on times."""
 
 from __future__ import annotations
 

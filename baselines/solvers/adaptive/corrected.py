@@ -108,7 +108,7 @@ class Corrected(NamedWrapper, abc.ABC):
 
     With R = exp(δ) R̂(q) and p = p̂(q) + d, the arm reaches the reference (R*, p*) where the model reaches
     (exp(-δ) R*, p* - d). The base policy is shown that reference, ahead as far as it looks, and as `pose` that of its
-    own model at q: its observation is as consistent as on an ideal plant, neither noisy nor late, whatever the sensors.
+    model at q: its observation is as consistent as on an ideal plant, neither noisy nor late, whatever the sensors.
     Subclasses estimate the deviation from measured poses and the joint coordinates where they were measured. A
     change of the estimate is blended in: poses that come one in many steps would make the reference jump, to which
     policies that plan only some Newton steps, or drives that lag, answer with oscillations.
@@ -132,13 +132,13 @@ class Corrected(NamedWrapper, abc.ABC):
     blend: Annotated[float, Bounds(at_least=0.0)] = 0.01
 
     @abc.abstractmethod
-    def learn(self, batch: Batch, measured: Measurement, own: Any, out: FloatArray, old: FloatArray) -> Any:
+    def learn(self, batch: Batch, measured: Measurement, outer: Any, out: FloatArray, old: FloatArray) -> Any:
         """Takes a measurement in.
 
         Args:
             batch: Observations.
             measured: Which rows have a new pose, and the joint coordinates where it was measured.
-            own: The wrapper's memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
+            outer: The wrapper's memory, a NamedTuple whose fields `before`, `age` and `rest` are left to the base;
                 must not be changed in place.
             out: Receives the deviations at the present joint coordinates. Shape (B, 6).
             old: Receives the ones without the measurement. Shape (B, 6).
@@ -153,21 +153,21 @@ class Corrected(NamedWrapper, abc.ABC):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         rows, task = len(batch.q), self.problem.task
         deviation, old = np.empty((rows, SIZE)), np.empty((rows, SIZE))
-        measured = recall(batch, self.problem.dt, own.before, own.age)
-        rest = own.rest
-        own = self.learn(batch, measured, own._replace(before=measured.before, age=measured.age), deviation, old)
+        measured = recall(batch, self.problem.dt, outer.before, outer.age)
+        rest = outer.rest
+        outer = self.learn(batch, measured, outer._replace(before=measured.before, age=measured.age), deviation, old)
         # The motion of the arm is followed at once, the change by a measurement little by little.
         stays = math.exp(-self.problem.dt / self.blend) if self.blend > 0.0 else 0.0
         rest = np.where(measured.first[:, None], 0.0, stays * (rest + old - deviation))
-        own, shown = own._replace(rest=rest), deviation + rest
+        outer, shown = outer._replace(rest=rest), deviation + rest
         nominal = np.ascontiguousarray(batch.nominal[:, : furthest(self.inner.preview)])
         pose, shifted = np.empty((rows, task.size)), np.empty(nominal.shape)
         show_rows(self.problem.model.chain, task.kind, batch.q, shown, nominal, pose, shifted)
         step = self.ask(batch._replace(pose=pose, nominal=shifted, pose_age=batch.q_age), inside)
-        return self.solution(step.qdot, own, step)
+        return self.solution(step.qdot, outer, step)
 
 
 @kernel

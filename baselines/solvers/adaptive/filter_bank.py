@@ -115,19 +115,19 @@ class ArmFilters(Corrected, abc.ABC):
         since = np.zeros(rows, np.int64)
         return BankMemory(*self.sensors(rows), since, estimates, covariances, weights, surprise, quiet)
 
-    def own_restarted(self, own: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
+    def own_restarted(self, outer: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
         """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
-        fresh = BankMemory(*super().own_restarted(own, rows))
-        kept = own._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
+        fresh = BankMemory(*super().own_restarted(outer, rows))
+        kept = outer._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
         return kept if self.keep else fresh
 
     def learn(
-        self, batch: Batch, measured: Measurement, own: BankMemory, out: FloatArray, old: FloatArray
+        self, batch: Batch, measured: Measurement, outer: BankMemory, out: FloatArray, old: FloatArray
     ) -> BankMemory:
         """See :meth:`Corrected.learn`."""
-        changes, kept = self.changes(), own._replace(since=own.since + 1)
+        changes, kept = self.changes(), outer._replace(since=outer.since + 1)
         if measured.new.any() or measured.first.any() or changes.walk > 0.0:
-            kept = kept._replace(**{name: getattr(own, name).copy() for name in own._fields[4:]})
+            kept = kept._replace(**{name: getattr(outer, name).copy() for name in outer._fields[4:]})
         known, variances = (self.problem.model.chain, self.problem.task.kind), self.variances()
         if self.start is not None and measured.first.any():
             exact, first = np.full_like(variances, self.start**2), np.ascontiguousarray(batch.nominal[:, 0])

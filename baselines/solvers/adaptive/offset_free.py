@@ -70,14 +70,14 @@ class OffsetFree(Corrected):
         return OffsetMemory(*self.sensors(rows), np.zeros((rows, SIZE)), np.zeros(rows, np.int64))
 
     def learn(
-        self, batch: Batch, measured: Measurement, own: OffsetMemory, out: FloatArray, old: FloatArray
+        self, batch: Batch, measured: Measurement, outer: OffsetMemory, out: FloatArray, old: FloatArray
     ) -> OffsetMemory:
         """See :meth:`Corrected.learn`."""
-        old[:] = out[:] = own.deviation
-        count = own.measured + measured.new
+        old[:] = out[:] = outer.deviation
+        count = outer.measured + measured.new
         chain, kind = self.problem.model.chain, self.problem.task.kind
         filter_rows(chain, kind, self.gain, batch.pose, measured.q, measured.new, count, out)
-        return own._replace(deviation=out.copy(), measured=count)
+        return outer._replace(deviation=out.copy(), measured=count)
 
 
 @kernel

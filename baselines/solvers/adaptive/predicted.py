@@ -127,8 +127,8 @@ class Predicted(NamedWrapper):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
-        kept = PredictedMemory(*[array.copy() for array in own])
+        outer, inside = self.split(memory)
+        kept = PredictedMemory(*[array.copy() for array in outer])
         off = self._observe(batch, kept)
         shown = self._shown(batch, kept)
         model_change = kept.arm_qdot[:, 0] - kept.arm_qdot[:, 1]
@@ -145,10 +145,10 @@ class Predicted(NamedWrapper):
         ``doubt`` says by how many steps delays that are not refuted differ from that one at most; inf before the arm
         has moved.
         """
-        own, _ = self.split(self.memory_of(state))
+        outer, _ = self.split(self.memory_of(state))
         with np.errstate(divide="ignore"):  # no lag at T = 1
-            constants = -self.problem.dt / np.log1p(-1.0 / own.lag)
-        drives = {"delay": own.delay, "time_constant": constants, "doubt": own.doubt[..., DELAY]}
+            constants = -self.problem.dt / np.log1p(-1.0 / outer.lag)
+        drives = {"delay": outer.delay, "time_constant": constants, "doubt": outer.doubt[..., DELAY]}
         return {**super().diagnostics(state), **drives}
 
     @functools.cached_property

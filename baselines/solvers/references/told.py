@@ -36,7 +36,7 @@ class Told(NamedWrapper):
         policy: The name of the policy that is told.
         options: Its parameters; those left out have its defaults.
         seed: Which episode is played; needed where anything is drawn.
-        arm_seed: Which arm moves; the seed's own if left out.
+        arm_seed: Which arm moves; that of the seed if left out.
         scenario: The tracking problem.
 
     Raises:
@@ -89,13 +89,13 @@ class Told(NamedWrapper):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
-        # A payload is the same as joints that stand elsewhere: the model goes on to be right.
+        outer, inside = self.split(memory)
+        # A payload is equivalent to other joint coordinates: the model remains right.
         q, nominal = batch.q + self._payload(batch), batch.nominal
         if isinstance(self.inner.preview, int):
             nominal = np.ascontiguousarray(nominal[:, : self.inner.preview])
         step = self.ask(batch._replace(q=q, nominal=nominal), inside)
-        return self.solution(step.qdot, own, step)
+        return self.solution(step.qdot, outer, step)
 
     def _payload(self, batch: Batch) -> FloatArray:
         """Offset of the joint zeros by the payload at the end of the step, in [rad] or [m]. Shape (B, n)."""

@@ -150,7 +150,7 @@ class FullOrientation(NamedWrapper):
     nests: ClassVar[bool] = False
 
     def inner_problem(self) -> Problem:
-        """The same with whole poses."""
+        """The problem with whole poses."""
         return full_problem(self.problem)
 
     def own_memory(self, rows: int) -> OrientationMemory:
@@ -159,8 +159,8 @@ class FullOrientation(NamedWrapper):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         shown = batch._replace(nominal=batch.nominal[:, : furthest(self.inner.preview)])
-        seen, kept = resolve_orientation(self.problem, shown, own)
+        seen, kept = resolve_orientation(self.problem, shown, outer)
         step = self.ask(seen, inside)
         return self.solution(step.qdot, kept, step)

@@ -81,17 +81,17 @@ class Smoothed(NamedWrapper):
 
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
-        own, inside = self.split(memory)
+        outer, inside = self.split(memory)
         dt, lambda_, limit = self.problem.dt, self.relaxation, self.problem.velocity_limit
-        known = own.known[:, None]
-        calculated = np.where(known, own.q, batch.q)
-        qdot = np.where(known, own.qdot, batch.qdot)
+        known = outer.known[:, None]
+        calculated = np.where(known, outer.q, batch.q)
+        qdot = np.where(known, outer.qdot, batch.qdot)
         shown = batch._replace(q=calculated, qdot=qdot, pose=self.problem.poses(calculated))
         step = self.ask(shown, self.inner.recall(inside, qdot))
         # The arm does not exceed the limit.
-        sent = np.clip(own.smooth, -limit, limit)
+        sent = np.clip(outer.smooth, -limit, limit)
         acceleration = lambda_**2 * (calculated - batch.q) - 2.0 * lambda_ * sent  # eq. 16
         kept = SmoothedMemory(
-            np.ones_like(own.known), calculated + dt * step.qdot, step.qdot, sent + dt * acceleration
+            np.ones_like(outer.known), calculated + dt * step.qdot, step.qdot, sent + dt * acceleration
         )  # eq. 17
-        return self.solution(own.smooth.copy(), kept, step)
+        return self.solution(outer.smooth.copy(), kept, step)

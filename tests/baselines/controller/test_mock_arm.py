@@ -139,7 +139,7 @@ def test_the_loop_starts_from_what_the_arm_has_taken_where_messages_are_lost():
 @pytest.mark.parametrize("drives", ["identify", Drives()])
 @pytest.mark.parametrize("reported", [True, False])
 def test_periods_without_a_call_start_no_reflex_of_jerk_where_the_acceleration_is_reported(drives, reported):
-    """The arm goes on with its last acceleration, which the loop does not know from the velocities that it sees."""
+    """The arm keeps its last acceleration, which the loop does not know from the velocities that it sees."""
     scenario, rng = SCENARIO.replace(jerk_limit=None, steps=1000), np.random.default_rng(1)
     arm = ArmInterface(
         scenario.replace(plant=Plant(bandwidth=8.0, command_delay=2) if drives == "identify" else Plant())

@@ -71,6 +71,6 @@ def test_the_arm_that_the_policy_moves_in_predicted_is_led_back_too():
     change, policy = scenario.dt * scenario.arm.acceleration_limit, controller.policy
     for periods in range(1, 4):
         controller.step(q, None, there)
-        own, _ = policy.split(policy.memory_of(controller._state))
-        assert (np.abs(own.arm_qdot[0, 0]) <= periods * change + 1e-12).all()
-        assert own.arm_qdot[0, 0, JOINT] < 0.0
+        outer, _ = policy.split(policy.memory_of(controller._state))
+        assert (np.abs(outer.arm_qdot[0, 0]) <= periods * change + 1e-12).all()
+        assert outer.arm_qdot[0, 0, JOINT] < 0.0

@@ -1,4 +1,4 @@
-"""Rows, tables, logs and pages of scenarios with collisions, beside those of others."""
+"""Rows, tables, logs and pages of scenarios with collisions and without."""
 
 import csv
 import json

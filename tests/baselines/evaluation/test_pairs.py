@@ -1,4 +1,4 @@
-"""Policies beside themselves on an ideal plant."""
+"""Policies compared with themselves on an ideal plant."""
 
 import dataclasses
 

@@ -65,7 +65,7 @@ def test_an_optimum_is_what_the_environment_charges_and_nothing_tried_is_cheaper
     optimum = solve(scenario, seed, QUICK)
     assert optimum.q.shape == optimum.qdot.shape == (scenario.steps, scenario.joints)
     assert (np.abs(optimum.qdot) <= scenario.velocity_limit).all()
-    # Written down anew: the arm goes where it is told, and the steps that count cost.
+    # Written down anew: the arm goes where it is sent, and the steps that count cost.
     trajectory = scenario.trajectory.sample(np.random.default_rng(0)) if not scenario.random else None
     start = scenario.first_q(trajectory) if trajectory else scenario.nominal_joint_path(seed)[0]
     q = start + scenario.dt * np.cumsum(optimum.qdot, axis=0)

@@ -42,5 +42,5 @@ def test_a_payload_is_foreseen(optimum):
 
 @pytest.mark.parametrize("plant", [Plant(zero=1e-3), Plant(bandwidth=10.0)])
 def test_of_a_plant_there_is_nothing_but_a_payload(plant):
-    with pytest.raises(InvalidInputError, match="expected an ideal plant, but for a payload"):
+    with pytest.raises(InvalidInputError, match="expected an ideal plant, except a payload"):
         EpisodeProblem.of(PLAIN.replace(plant=plant), SEED)

@@ -40,7 +40,7 @@ def test_they_are_the_same_and_kept_here(pool, monkeypatch, tmp_path):
     asked = len(pool.units)
     assert asked == 2 + 1 + 2  # one was lost
     assert costs(find_all(wanted(), FAR)) == alone
-    assert len(pool.units) == asked  # an interrupted search goes on: nothing is searched twice
+    assert len(pool.units) == asked  # an interrupted search continues: nothing is searched twice
 
 
 def test_a_path_that_costs_something_else_here_is_refused(pool, monkeypatch):

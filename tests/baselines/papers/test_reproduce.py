@@ -87,7 +87,7 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 def difference(now, then):
     """Why two lines of figures differ: numbers by more than 5 %, or other numbers; None if they do not.
 
-    Numbers below 1e-9 are rounding errors, which every machine has of its own.
+    Numbers below 1e-9 are rounding errors, which differ between machines.
     """
     a, b = (list(map(float, NUMBER.findall(text))) for text in (now, then))
     if len(a) != len(b):

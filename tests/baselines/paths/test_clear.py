@@ -1,4 +1,4 @@
-"""Paths beside obstacles: starts that are clear, and what is said where none leads along."""
+"""Paths among obstacles: starts that are clear, and what is said where none leads along."""
 
 from __future__ import annotations
 

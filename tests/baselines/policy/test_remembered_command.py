@@ -1,4 +1,4 @@
-"""Policies under acceleration limits keep them from their own last command, whatever joint velocity they observe."""
+"""Policies under acceleration limits keep them from their last command, whatever joint velocity they observe."""
 
 import gymnasium as gym
 import numpy as np

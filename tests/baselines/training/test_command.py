@@ -127,7 +127,7 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_from_the_shell(tmp_path):
-    """As a program of its own, with warnings as errors."""
+    """As a separate program, with warnings as errors."""
     arguments = [ROOT / "train.py", "apg", *TINY, "--out", "."]
     command = [sys.executable, "-W", "error", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)

@@ -50,7 +50,7 @@ def test_names_are_shown_and_do_not_run(serving, tmp_path):
     viewer.session.place(stage.scenario.arm.upper)
     viewer.tick(1.0)  # the panel names the joint at its limit
     errors, foreign = [], []
-    with chromium() as browser:  # begins after the server, and ends before it: both have a loop of their own
+    with chromium() as browser:  # begins after the server, and ends before it: each has an event loop
         tab = browser.new_page()
         tab.on("pageerror", lambda error: errors.append(str(error)))
         tab.on("request", lambda request: foreign.append(request.url))

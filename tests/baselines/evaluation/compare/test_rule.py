@@ -16,7 +16,7 @@ STOPPED, SLOW, HARSH = {"steps_at_joint_limit": 1}, {"time_p50_us": 2001.0}, {"q
 
 
 def rows(**changes):
-    """Rows of three solvers, good ones but for the changes."""
+    """Rows of three solvers, good ones except for the changes."""
     return {name: dataclasses.replace(GOOD, **changes.get(name, {})) for name in ("sns", "dls", "qp")}
 
 

@@ -1,4 +1,4 @@
-"""From the URDF of an arm of one's own to messages, by commands; a controller's spline is the motion."""
+"""From the URDF of an arm to messages, by commands; a controller's spline is the motion."""
 
 from __future__ import annotations
 

@@ -68,12 +68,12 @@ def memory(policy, state):
 
 def deviation_of(policy, state, q):
     """What a policy takes the deviation to be at a posture."""
-    own = memory(policy, state)
-    if hasattr(own, "deviation"):
-        return own.deviation[0]
+    outer = memory(policy, state)
+    if hasattr(outer, "deviation"):
+        return outer.deviation[0]
     out, batch = np.empty((1, 6)), type("Shown", (), {"q": q[None], "pose": np.zeros((1, 12))})
     measured = type("Measured", (), {name: np.zeros(1, np.bool_) for name in ("new", "first")} | {"q": q[None]})
-    policy.learn(batch, measured, own, out, np.empty((1, 6)))
+    policy.learn(batch, measured, outer, out, np.empty((1, 6)))
     return out[0]
 
 

@@ -48,7 +48,7 @@ def test_a_policy_of_gain_1_is_lost_by_itself_and_not_with_known_drives(ideal):
 
 
 def test_unknown_drives_are_identified():
-    """Row by row, each with drives of its own; within 3 % of the lag, or 0.1 ms."""
+    """Row by row, each with other drives; within 3 % of the lag, or 0.1 ms."""
     scenario, seeds = gentle(), range(SEED, SEED + 6)
     drives = {"command_delay": (0, 12), "bandwidth": (10.0, 20.0)}
     costs, together, told = driven(scenario, made(), seeds, **drives)

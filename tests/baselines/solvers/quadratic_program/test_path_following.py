@@ -19,7 +19,7 @@ def too_fast(**changes):
 
 
 def followed(scenario, **parameters):
-    """Distances in [m] from the reference at the policy's own progress, progress, statuses, and joints held back."""
+    """Distances in [m] from the reference at the progress of the policy, progress, statuses, and joints held back."""
     episode = played(scenario, "qp_path", **parameters)
     progress = episode.diagnostics["progress"]
     there = scenario.trajectory.frames(progress * scenario.dt, scenario.model)[:, -3:]
@@ -145,7 +145,7 @@ def test_where_the_path_leaves_the_reach_it_stands_still_and_says_so():
 
 
 def test_it_begins_where_the_arm_is():
-    """From beside the path the arm goes to its first pose, and follows it from there."""
+    """From next to the path the arm goes to its first pose, and follows it from there."""
     scenario = circle()
     errors, progress, *_ = followed(scenario.replace(start=scenario.start_of(0) + 0.05))
     arrived = np.argmax(progress > 1.0)

@@ -14,7 +14,7 @@ AWAY, POSITION, ORIENTATION = 0.5, 0.01, 0.3
 
 
 def recovered(signs, steps, **parameters):
-    """Which of the first validation episodes are back on their trajectory after so many steps.
+    """Which of the first validation episodes are back on their trajectory after `steps` steps.
 
     Args:
         signs: Of the displacements. Shape (episodes, n).

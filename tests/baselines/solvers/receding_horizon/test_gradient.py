@@ -99,7 +99,7 @@ def test_gradients_against_central_differences(name):
     ],
 )
 def test_diverges_as_printed_and_says_so(alpha_start, warm_start, name, steps):
-    """After a blow-up the row goes on, and nothing claims to have converged."""
+    """After a blow-up the row continues, and nothing claims to have converged."""
     scenario = ikgym.scenarios.get(name).replace(steps=steps)
     policy = baselines.make("rhc_gradient", scenario, alpha_start=alpha_start, warm_start=warm_start)
     assert (policy.alpha_min, policy.alpha_max) == (1e-8, 5e-4)

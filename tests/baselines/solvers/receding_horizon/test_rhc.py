@@ -63,7 +63,7 @@ def planned(policy, q, nominal, state=None, **more):
 
 
 def compare(policy, solver, costs, horizons, plans):
-    """Never above IPOPT's minimum, and where IPOPT goes on from the plan there is nothing left to gain."""
+    """Never above IPOPT's minimum, and where IPOPT starts from the plan there is nothing left to gain."""
     for cost, horizon, plan in zip(costs, horizons, plans, strict=True):
         for start in (None, plan):
             best = solver.solve(horizon, start)

@@ -12,7 +12,7 @@ SHORT = scenarios.get("rlitg-hello").replace(steps=200)
 
 
 def test_it_is_at_the_published_joint_coordinates_at_the_waypoints():
-    """Where no limit acts, what is played is what was published, but for the rounding of float32 actions."""
+    """Where no limit acts, what is played is what was published, except for the rounding of float32 actions."""
     method = "reinforcement"
     played = baselines.track(SHORT, f"published:{method}")
     joints = problems.get("rlitg-hello").trajectories[method][:21]

@@ -1,4 +1,4 @@
-"""Solvers of other projects: what they are told, what they keep, and what they say when they cannot."""
+"""Solvers of other projects: what they receive, what they keep, and what they say when they cannot."""
 
 import importlib
 import threading
@@ -56,7 +56,7 @@ def test_a_gentle_path_is_tracked_to_rounding(name, task):
     ("name", "task"), [(name, task) for name in RIVALS for task in get(name).tasks if task != "matrix"]
 )
 def test_the_measured_pose_corrects_a_wrong_model(name, task):
-    """The arm as it was built is millimetres off its nominal model, and holds a tool that nobody has told of."""
+    """The arm as it was built is millimetres off its nominal model, and holds an unknown tool."""
     built, base = ikgym.arms.get("panda-7"), ikgym.scenarios.get("panda-circle")
     tool = built.tool + 0.1 * built.tool_rotation[:, 2]
     turned = built.tool_rotation @ rodrigues(np.array([0.6, 0.0, 0.8]), 0.3 if task == "pose" else 0.0)

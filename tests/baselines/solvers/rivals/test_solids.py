@@ -16,7 +16,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Capsule, HalfSpace, Sphere
 from tests.baselines.making import circle, made
 
-#: A sphere and a capsule beside a circle's boxes, and a wall that is askew.
+#: A sphere and a capsule next to a circle's boxes, and a wall that is askew.
 OTHERS = (
     Sphere("ball", [0.3, 0.6, 0.9], 0.1),
     Capsule("bar", [0.5, -0.6, 0.2], [0.6, -0.7, 0.5], 0.05, ignored=["hand"]),

@@ -156,5 +156,5 @@ def test_true_cost_is_that_of_the_horizon(arm, task):
     data = HorizonModel(*at.data, at.problem.joint_weights)
     kernels = horizon_cost(data, at.start, at.nominal, qdot)
     mine = true_cost(at.problem, at.path, at.workspace)
-    assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ but for rounding
+    assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ up to rounding
     assert at.linearise()[0][1] == pytest.approx(mine, rel=1e-13)

@@ -29,7 +29,7 @@ def test_offsets_rise_to_the_end_by_growing_blocks(horizon):
     assert at[-1] == steps
     if blocks > 2:
         assert lengths[:2].tolist() == [1, 1]
-        assert (np.diff(lengths[:-1]) >= -1).all()  # but for rounding, they grow
+        assert (np.diff(lengths[:-1]) >= -1).all()  # up to rounding, they grow
 
 
 def test_offsets_grow_geometrically():
