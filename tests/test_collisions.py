@@ -1,4 +1,4 @@
-"""Arms that are stopped where bodies touch: simulated in all ways."""
+"""Arms that are stopped where bodies touch; that all ways of simulation agree is in test_proximity.py."""
 
 import gymnasium as gym
 import numpy as np
@@ -9,7 +9,6 @@ from ikgym.arms.bodies import Bodies
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
 from ikgym.plant import Plant
 from ikgym.trajectories import StraightLine
-from tests.comparison import played_alike
 
 LINKS = Bodies(
     names=["upper", "lower", "tool"],
@@ -89,15 +88,6 @@ def test_an_arm_that_is_stopped_pays_to_the_end(scenario):
     first = collided.index(True)
     assert all(collided[first:])
     assert max(rewards[first:]) < 0.0
-
-
-def test_one_arm_many_in_a_loop_and_many_at_once_agree():
-    plant = Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
-    crowd = among(person()).replace(plant=plant)
-    native, sync = vectors_of(crowd)
-    returned = played_alike(native, sync, wild(5, 200))
-    assert returned[-1][4]["collision"].any()
-    assert returned[-1][0]["obstacles"].shape == (5, 5, 16)
 
 
 def test_obstacles_are_shown_as_they_will_be_after_the_step(scenario):

@@ -18,6 +18,7 @@ from ikgym.obstacles import Sphere
 from ikgym.trajectories import StraightLine
 from tests.comparison import identical
 from tests.every_scenario import every_scenario
+from tests.limited import limited
 
 #: A scenario of each task, of 2, 3, 6, 7 and 8 joints, random, held, with a late plant and with one drawn from ranges.
 ONE_A_TASK = (
@@ -83,11 +84,12 @@ def by_hand(scenario, actions, seed):
     nominal, qdot, arm = scenario.nominal(seed, 2), np.zeros(scenario.joints), scenario.arm
     for k, action in enumerate(actions):
         command = np.clip(action.astype(np.float64), -1, 1) * scenario.velocity_limit
-        command = np.clip(command, -arm.velocity_limit, arm.velocity_limit)
+        allowed = np.clip(command, -arm.velocity_limit, arm.velocity_limit)
         change = scenario.dt * arm.acceleration_limit
-        qdot, before = np.clip(command, qdot - change, qdot + change), q
-        q = np.clip(before + scenario.dt * qdot, arm.lower, arm.upper)
-        qdot = np.where(q == before + scenario.dt * qdot, qdot, (q - before) / scenario.dt)
+        driven, before = np.clip(allowed, qdot - change, qdot + change), q
+        q = np.clip(before + scenario.dt * driven, arm.lower, arm.upper)
+        qdot = np.where(q == before + scenario.dt * driven, driven, (q - before) / scenario.dt)
+        lost = np.abs([driven - qdot, command - allowed, allowed - driven]) > 1e-6 * scenario.velocity_limit
         coordinates = scenario.task.coordinates(*scenario.arm.forward(q))
         error = scenario.task.error(nominal[k + 1], coordinates)
         yield (
@@ -101,6 +103,7 @@ def by_hand(scenario, actions, seed):
             scenario.cost.tracking(error),
             scenario.cost.velocity(qdot),
             error,
+            lost.sum(axis=1).tolist(),
         )
 
 
@@ -112,16 +115,18 @@ STEPPED = [  # what other plants do is in tests/plant
         if one.values[0].iterations_per_point == (1,) and one.values[0].plant.ideal
     ),
     pytest.param(AXIS, id=AXIS.name),
+    pytest.param(limited(steps=200), id="limited"),
 ]
 
 
 @pytest.mark.parametrize("scenario", STEPPED)
 def test_steps_are_what_the_specification_says(scenario):
-    scenario = scenario.replace(steps=12)
+    scenario = scenario.replace(steps=200 if scenario.name == "limited7-random" else 12)
     env = make(scenario)
     env.reset(seed=21)
-    actions = np.random.default_rng(3).uniform(-1.1, 1.1, (12, scenario.joints)).astype(np.float32)
-    for k, (observation, tracking, velocity, error) in enumerate(by_hand(scenario, actions, 21)):
+    actions = np.random.default_rng(3).uniform(-1.1, 1.1, (scenario.steps, scenario.joints)).astype(np.float32)
+    held = np.zeros(3)
+    for k, (observation, tracking, velocity, error, at_limit) in enumerate(by_hand(scenario, actions, 21)):
         got, reward, terminated, truncated, info = env.step(actions[k])
         for key, value in observation.items():
             np.testing.assert_allclose(got[key], value, rtol=1e-13, atol=1e-13, err_msg=key)
@@ -134,8 +139,11 @@ def test_steps_are_what_the_specification_says(scenario):
         assert info["position_error"] == pytest.approx(np.linalg.norm(position), rel=1e-9)
         if scenario.task.name in ("pose", "axis"):  # the angle between orientations, or between axes
             assert info["orientation_error"] == pytest.approx(np.linalg.norm(error[3:]), rel=1e-9)
+        held += info["at_limit"]
+        assert info["at_limit"].tolist() == at_limit
         assert not terminated
-        assert truncated is (k == 11)
+        assert truncated is (k == scenario.steps - 1)
+    assert scenario.name != "limited7-random" or (held > 0).all()
 
 
 def test_held_points_count_once():

@@ -34,6 +34,7 @@ def test_one_arm_many_in_a_loop_and_many_at_once_pay_what_the_formula_says():
         np.testing.assert_array_equal(rewards, -total)
         paid.append(infos["proximity_cost"])
     assert infos["collision"].any()
+    assert returned[-1][0]["obstacles"].shape == (5, 5, 16)
     assert 0.0 < np.mean(np.array(paid)[1::2] > 0.0) < 1.0
 
 

@@ -1,9 +1,10 @@
+"""Kinematics of all arms against Pinocchio; Jacobians against central differences are in tests/test_tasks.py."""
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from ikgym import arms
-from ikgym.kernels.rotations import rotation_vector
 from tests.pinocchio_models import model_of, tool_state
 
 # All arms are of a few metres: rounding of some ten additions and products stays far below.
@@ -37,20 +38,6 @@ def test_forward_kinematics_and_jacobian_agree_with_pinocchio(arm):
         np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=TOLERANCE)
         np.testing.assert_allclose(position, expected.position, rtol=0, atol=TOLERANCE)
         np.testing.assert_allclose(jacobian, expected.jacobian, rtol=0, atol=TOLERANCE)
-
-
-@every_arm
-def test_jacobian_agrees_with_central_differences(arm):
-    step = 1e-6
-    for q in configurations(arm):
-        jacobian = arm.jacobian(q)
-        rotations, positions = arm.forward(q + step * np.vstack([np.eye(arm.joints), -np.eye(arm.joints)]))
-        for i in range(arm.joints):
-            ahead, behind = i, arm.joints + i
-            turn = rotation_vector(rotations[ahead] @ rotations[behind].T) / (2 * step)
-            shift = (positions[ahead] - positions[behind]) / (2 * step)
-            # Rounding of the position, about 1e-15 m, divided by the step.
-            np.testing.assert_allclose(jacobian[:, i], np.hstack([shift, turn]), rtol=0, atol=1e-8)
 
 
 @every_arm

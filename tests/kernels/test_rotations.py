@@ -75,12 +75,6 @@ def test_rotation_vector_and_rodrigues_undo_each_other(axis, angle):
     np.testing.assert_allclose(again, rotation, rtol=0, atol=1e-14)
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_rotation_vector_agrees_with_scipy(seed):
-    rotation = Rotation.random(rng=np.random.default_rng(seed))
-    np.testing.assert_allclose(rotation_vector(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-13)
-
-
 @given(unit_vectors, st.floats(-math.pi, math.pi))
 def test_quaternion_is_of_unit_length_with_its_real_part_not_negative(axis, angle):
     got = np.array(quaternion(rodrigues(axis, angle)))

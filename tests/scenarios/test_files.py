@@ -211,15 +211,22 @@ def test_bodies_from_meshes_are_read_from_them_again(urdf, tmp_path):
     assert identical(fields(load(file)), fields(scenario))
 
 
-def test_what_a_urdf_has_not_is_added(urdf, tmp_path):
-    file = tmp_path / "mine.toml"
+def test_what_a_urdf_has_not_is_added_and_the_arm_keeps_its_file(urdf, tmp_path, caplog):
+    """Without it the viewer would lose the meshes; an arm that moves otherwise is no longer that of the file."""
+    file, again = tmp_path / "mine.toml", tmp_path / "again.toml"
     on_urdf(urdf).save(file)
-    file.write_text(file.read_text().replace("[arm]", "[arm]\nhome = [0.1, 0.2]\nacceleration_limit = [5.0, 5.0]"))
+    text = file.read_text()
+    file.write_text(text.replace("[arm]", "[arm]\nhome = [0.1, 0.2]\nacceleration_limit = [5.0, 5.0]"))
     arm = load(file).arm
     np.testing.assert_array_equal(arm.home, [0.1, 0.2])
     np.testing.assert_array_equal(arm.acceleration_limit, [5.0, 5.0])
-    load(file).save(tmp_path / "again.toml")
-    assert identical(fields(load(tmp_path / "again.toml")), fields(load(file)))
+    assert arm.urdf.file == urdf.resolve()
+    load(file).save(again)
+    assert tomllib.loads(again.read_text())["arm"]["urdf"] == "arms/two.urdf"
+    assert identical(fields(load(again)), fields(load(file)))
+    file.write_text(text.replace("[arm]", "[arm]\naxes = [[0, 0, 1], [0, 1, 0]]"))
+    assert load(file).arm.urdf is None
+    assert "axes: the arm differs from its file" in caplog.text
 
 
 @pytest.mark.parametrize("change", ["gone", "another", "faulty"])
@@ -370,20 +377,3 @@ def test_a_scenario_is_added_by_one_file_and_an_arm_by_one_table(tmp_path):
     one, long = (make() for make in read_catalogue(added).values())
     np.testing.assert_array_equal(long.forward([0.0])[1] - one.forward([0.0])[1], [2, 0, 0])
     assert (long.name, long.joints) == ("long", 1)
-
-
-def test_an_arm_keeps_its_urdf_file_where_only_limits_change(tmp_path, caplog):
-    """Acceleration limits, which no URDF states, made the viewer lose the meshes."""
-    (tmp_path / "two.urdf").write_text(PAIR)
-    text = 'name = "s"\ntask = "pose"\ndt = 0.01\nsteps = 5\nvelocity_limit = 3.0\n[trajectory]\nkind = "sinusoid"\n'
-    text += 'amplitude = [0.1, 0.2]\n[arm]\nurdf = "two.urdf"\nacceleration_limit = [5.0, 6.0]\n'
-    (tmp_path / "s.toml").write_text(text)
-    scenario = load(tmp_path / "s.toml")
-    assert scenario.arm.urdf.file == (tmp_path / "two.urdf").resolve()
-    scenario.save(tmp_path / "copy.toml")
-    again = load(tmp_path / "copy.toml").arm
-    assert tomllib.loads((tmp_path / "copy.toml").read_text())["arm"]["urdf"] == "two.urdf"
-    assert (again.urdf.file, again.acceleration_limit.tolist()) == (scenario.arm.urdf.file, [5.0, 6.0])
-    (tmp_path / "s.toml").write_text(text + "axes = [[0, 0, 1], [0, 1, 0]]\n")
-    assert load(tmp_path / "s.toml").arm.urdf is None
-    assert "axes: the arm differs from its file" in caplog.text

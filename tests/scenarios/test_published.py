@@ -11,8 +11,8 @@ from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.comparison import identical
 
 NAMES = scenarios.names("published")
-#: From waypoint to waypoint in [s], and in control steps.
-PERIOD, STEPS = 0.2, 10
+#: Control steps from waypoint to waypoint.
+STEPS = 10
 RANDOM = scenarios.get("rlitg-random")
 
 

@@ -8,39 +8,8 @@ import pytest
 import ikgym
 from ikgym import scenarios
 from ikgym.exceptions import IkgymError, UnknownNameError
-from ikgym.kernels import threads
 from ikgym.plant import Plant
 from tests.every_scenario import every_scenario
-
-
-def test_catalogue():
-    """Arm, model, task, Δt, steps and velocity limit of each in the papers."""
-    table = {
-        s.name: (s.arm.name, s.model.name, s.task.name, s.dt, s.steps, s.velocity_limit[0])
-        for s in map(scenarios.get, scenarios.names("papers"))
-    }
-    varga, literal = ("varga7", "varga7", "skew", 1e-3), ("varga7_literal", "varga7_literal", "skew", 1e-3)
-    pose = ("varga7", "varga7", "pose", 1e-3)
-    faitli = ("faitli3", "faitli3", "position", 1e-3, 6283, 50.0)
-    khan = ("khan8", "khan8_approximate", "matrix", 1e-3, 100_500, 50.0)
-    assert table == {
-        "varga7-fast": (*varga, 3000, 20.0),
-        "varga7-slow": (*varga, 3000, 20.0),
-        "varga7-literal-fast": (*literal, 3000, 20.0),
-        "varga7-literal-slow": (*literal, 3000, 20.0),
-        "varga7-random": (*varga, 1000, 20.0),
-        "varga7-random-long": (*varga, 3000, 20.0),
-        "varga7-pose-random": (*pose, 1000, 20.0),
-        "varga7-pose-random-long": (*pose, 3000, 20.0),
-        "faitli3-stretched": faitli,
-        "faitli3-regular": faitli,
-        "faitli3-shoulder": faitli,
-        "khan8-q1": khan,
-        "khan8-q7q8": khan,
-        "planar2-bent": ("planar2", "planar2", "position", 1e-3, 20_000, 50.0),
-        "zhang3-helix": ("zhang3", "zhang3", "position", 1.0, 799, 10.0),
-        "zhang6-lspb": ("puma560", "puma560", "pose", 1e-3, 2000, 20.0),
-    }
 
 
 @pytest.mark.parametrize("name", every_scenario())
@@ -74,18 +43,6 @@ def test_disturbance_moves_the_arm_as_said():
     np.testing.assert_allclose(drifts.mean(axis=0), 0.5, atol=0.05)
     np.testing.assert_allclose(drifts.std(axis=0), 0.25 / 3**0.5, rtol=0.2)
     assert abs(np.corrcoef(drifts.T) - np.eye(7)).max() < 0.25
-
-
-def test_chunks_cover_all_rows_once(monkeypatch):
-    monkeypatch.setattr(threads, "count_cores", lambda: 4)
-    for rows in (0, 1, 7, 100, 1001):
-        seen = np.zeros(rows, dtype=int)
-
-        def work(start, stop, seen=seen):
-            seen[start:stop] += 1
-
-        threads.in_chunks(work, rows, grain=10)
-        assert (seen == 1).all()
 
 
 def test_replace():

@@ -8,7 +8,6 @@ import pytest
 
 import ikgym
 from baselines.fingerprints import fingerprint
-from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
 from ikgym.trajectories import FixedOrientation, PathTrajectory, Quintic, Trajectory, paths
@@ -39,16 +38,6 @@ def test_the_arm_begins_at_the_first_pose_within_its_limits(task):
     np.testing.assert_array_equal(observation["q"], q)
     rows = gym.make_vec("RedundantIK-v0", num_envs=3, scenario=one).reset(seed=3)[0]
     np.testing.assert_array_equal(rows["q"], [q] * 3)
-
-
-def test_a_file_leaves_the_start_out(tmp_path):
-    one, file = scenario(), tmp_path / "x.toml"
-    one.save(file)
-    whole, _ = file.read_text().split("[trajectory]")
-    assert "start" not in whole
-    read = scenarios.load(file)
-    assert fingerprint(read) == fingerprint(one)
-    np.testing.assert_array_equal(read.first_q(read.trajectory), one.first_q(one.trajectory))
 
 
 def test_a_path_that_begins_out_of_reach_is_refused():

@@ -24,6 +24,8 @@ def test_poses_and_joint_coordinates():
     slower = RetimedTrajectory(MOTION, [0.0, 3.0], [0.0, 1.5], [0.5, 0.5])
     np.testing.assert_allclose(slower.joint_path(2.0 * times), expected, atol=1e-9)
     assert slower.duration == 2.0 * MOTION.duration
+    np.testing.assert_array_equal(slower.first_joints(), Q[0])
+    np.testing.assert_array_equal(slower.joint_bound(), MOTION.joint_bound())
 
 
 def test_files_keep_every_number(tmp_path):

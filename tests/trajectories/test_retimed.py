@@ -23,12 +23,3 @@ def test_poses_are_those_of_the_other_trajectory():
     )
     assert SLOWER.duration == 4.0
     assert SLOWER.has_orientation
-
-
-def test_joint_paths_too():
-    base = ikgym.scenarios.get("panda-singular").trajectory
-    slower = RetimedTrajectory(base, TIMES, PROGRESS, RATES)
-    times = np.linspace(0.0, 4.0, 9)
-    np.testing.assert_array_equal(slower.joint_path(times), base.joint_path(slower.base_times(times)))
-    np.testing.assert_array_equal(slower.first_joints(), base.first_joints())
-    np.testing.assert_array_equal(slower.joint_bound(), base.joint_bound())

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
-from ikgym.trajectories import Sinusoid, frames_of
+from ikgym.trajectories import RandomJointSpline, Sinusoid, first_joints_of, frames_of
 from tests.comparison import identical
 
 TIMES = np.linspace(0, 7, 57)
@@ -118,8 +118,9 @@ class Shaken(Sinusoid):
         return super().joint_path(times) + 0.1 * times[:, None]
 
 
-@pytest.mark.parametrize("kinds", ["drawn", "bent", "shaken", "mixed"])
+@pytest.mark.parametrize("kinds", ["drawn", "bent", "shaken", "mixed", "splines"])
 def test_frames_of_many_are_those_of_each(kinds):
+    """Splines are also drawn together as each alone."""
     arm = ikgym.arms.get("varga7")
     rng = np.random.default_rng(2)
     random = ikgym.scenarios.get("varga7-random").trajectory
@@ -128,8 +129,16 @@ def test_frames_of_many_are_those_of_each(kinds):
     shaken = [Shaken(s.amplitude, s.frequency, s.phase) for s in drawn]
     line = ikgym.scenarios.get("zhang6-lspb").trajectory
     mixed = [drawn[0], bent[1], line, shaken[2], drawn[3]]
-    trajectories = {"drawn": drawn, "bent": bent, "shaken": shaken, "mixed": mixed}[kinds]
+    spline = RandomJointSpline(-np.ones(7), np.ones(7), np.ones(7), np.ones(7), 2.0)
+    splines = spline.samples([np.random.default_rng(seed) for seed in range(5)])
+    assert all(
+        identical(one.control, spline.sample(np.random.default_rng(seed)).control) for seed, one in enumerate(splines)
+    )
+    trajectories = {"drawn": drawn, "bent": bent, "shaken": shaken, "mixed": mixed, "splines": splines}[kinds]
     times = rng.uniform(0.0, 9.0, (5, 13))
     many = frames_of(trajectories, times, arm)
     for frames, trajectory, row in zip(many, trajectories, times, strict=True):
         assert identical(frames, trajectory.frames(row, arm))
+    if kinds == "splines":
+        first = np.array([spline.joint_path(np.zeros(1))[0] for spline in splines])
+        assert identical(first_joints_of(splines), first)

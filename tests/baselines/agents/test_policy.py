@@ -56,20 +56,6 @@ def row(observation, i):
 
 
 @contract
-def test_batch_equals_single_calls_where_skew_coordinates_are_shown(processing):
-    """To an agent that was trained on whole poses; the contract suite plays agents as they were trained."""
-    policy = agent_on(RANDOM, processing, WHOLE)
-    states, batched = [None] * 3, None
-    for k, observation in enumerate(observations(RANDOM, policy.preview, 3)):
-        start = np.array([k == 0, k % 2 == 0, k in (0, 2)])
-        action, batched = policy.predict(observation, state=batched, episode_start=start)
-        for i in range(3):
-            single, states[i] = policy.predict(row(observation, i), None if start[i] else states[i], [False])
-            assert identical(single, action[i])
-            assert all(identical(a[0], b[i]) for a, b in zip(states[i], batched, strict=True))
-
-
-@contract
 def test_the_network_is_evaluated_at_intervals(processing):
     """Every third step after the start of an episode, row by row; with feedback in between."""
     every, third = (agent_on(WHOLE, processing, interval=steps) for steps in (1, 3))

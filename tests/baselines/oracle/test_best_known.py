@@ -38,13 +38,6 @@ def one(scenario, value, seed=0, **changes):
     )
 
 
-@pytest.fixture
-def file(tmp_path, monkeypatch):
-    path = tmp_path / "data" / "best.json"
-    monkeypatch.setattr(best_known, "DATA", path)
-    return path
-
-
 def test_the_data_of_the_package_are_in_order():
     there = read()
     assert [(r.scenario, r.seed) for r in there] == sorted({(r.scenario, r.seed) for r in there})

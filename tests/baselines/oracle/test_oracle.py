@@ -318,41 +318,31 @@ def test_the_arm_that_moves_is_polished(monkeypatch):
         assert_allclose(there, wanted, rtol=0, atol=1e-8)
 
 
-@pytest.fixture
-def data(tmp_path, monkeypatch):
-    path = tmp_path / "data" / "best.json"
-    monkeypatch.setattr(best_known, "DATA", path)
-    monkeypatch.setattr(best_known.record, "__defaults__", (path,))
-    return path
-
-
 class TestCommandLine:
     RANDOM = ("--scenarios", "short", "--starts", "2", "--generations", "0", "--knots", "30", "--seeds", "1000000")
 
     @pytest.fixture(autouse=True)
-    def scenario(self, monkeypatch):
-        for part in ("_makers", "_made"):
-            monkeypatch.setattr(ikgym.scenarios._registry, part, dict(getattr(ikgym.scenarios._registry, part)))
+    def scenario(self, own_registries):
         scenario = short("varga7-random", 100, name="short")
         ikgym.scenarios.register(scenario)
         return scenario
 
-    def test_update(self, data, capsys, scenario):
+    def test_update(self, file, capsys, scenario):
         assert optimum_command.main([*self.RANDOM, "--update"]) == 0
-        (known,) = best_known.read(data)
+        (known,) = best_known.read(file)
         out = capsys.readouterr().out
         assert f"short, seed 1000000: {known.cost:.10g}" in out
         assert "1 of 1 records are new or better" in out
         assert known.hash == episode_hash(scenario, 1_000_000)
         assert optimum_command.main([*self.RANDOM, "--update"]) == 0
         assert "0 of 1 records are new or better" in capsys.readouterr().out
-        data.unlink()
+        file.unlink()
         best_known._read.cache_clear()
-        best_known.record([dataclasses.replace(known, cost=(1.0 + 3e-6) * known.cost)], data)
+        best_known.record([dataclasses.replace(known, cost=(1.0 + 3e-6) * known.cost)], file)
         assert optimum_command.main([*self.RANDOM, "--update"]) == 0
         assert "1 of 1 records are new or better" in capsys.readouterr().out
 
-    def test_ctrl_c_keeps_what_is_done(self, data, monkeypatch, capsys):
+    def test_ctrl_c_keeps_what_is_done(self, file, monkeypatch, capsys):
         solved = cache.search
 
         def interrupted(scenario, seed, *rest):
@@ -363,7 +353,7 @@ class TestCommandLine:
         monkeypatch.setattr(cache, "search", interrupted)
         assert optimum_command.main([*self.RANDOM, "1000001", "1000002", "--update"]) == 130
         assert "are kept" in capsys.readouterr().err
-        assert [known.seed for known in best_known.read(data)] == [1_000_000]
+        assert [known.seed for known in best_known.read(file)] == [1_000_000]
 
     @pytest.mark.parametrize(
         ("arguments", "words"),
@@ -392,28 +382,22 @@ def test_all_episodes_have_a_record():
     assert not missing, f"find them with: {best_known.UPDATE}"
 
 
-def reproduced(name, seed, how):
-    scenario = ikgym.scenarios.get(name)
-    known = best_known.lookup(scenario, seed)
-    optimum = solve(scenario, seed, how)
-    assert optimum.cost == pytest.approx(known.cost, rel=1e-6, abs=best_known.MEANINGLESS)
-
-
 #: Without random starts and local search: to these records the nominal joint path leads, too.
 FROM_THE_PATH = Search(starts=0, generations=0)
 
 
-def test_a_record_is_reproduced():
-    reproduced("tiago-fast", 0, FROM_THE_PATH)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "how"),
-    [("varga7-fast", 0, FROM_THE_PATH), ("khan8-q1", 0, FROM_THE_PATH), ("varga7-random", 2_000_000, Search())],
+    [
+        ("tiago-fast", 0, FROM_THE_PATH),
+        *(pytest.param(name, 0, FROM_THE_PATH, marks=pytest.mark.slow) for name in ("varga7-fast", "khan8-q1")),
+        pytest.param("varga7-random", 2_000_000, Search(), marks=pytest.mark.slow),
+    ],
 )
 def test_records_are_reproduced(name, seed, how):
-    reproduced(name, seed, how)
+    scenario = ikgym.scenarios.get(name)
+    known = best_known.lookup(scenario, seed)
+    assert solve(scenario, seed, how).cost == pytest.approx(known.cost, rel=1e-6, abs=best_known.MEANINGLESS)
 
 
 # An independent optimiser: CasADi's IPOPT.

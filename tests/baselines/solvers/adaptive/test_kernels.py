@@ -121,12 +121,3 @@ def test_poses_are_taken_in_once_with_the_joint_coordinates_of_their_moment():
     # are taken to have gone on.
     assert played([3] * 8, 1)[0][4:] == [1.0, 2.0, 3.0, 4.0]
     assert played([1] * 8, 3)[0][4:] == [3.0, 4.0, 5.0, 6.0]
-
-
-def test_observations_without_ages_are_new_at_each_step():
-    batch = Batch(*[np.ones((1, 1))] * 3, np.ones((1, 1, 1)), np.ones((1, 1)))
-    past, age = nothing_measured(1, 4, 1)
-    for _ in range(3):
-        measured = recall(batch, 1.0, past, age)
-        past, age = measured.before, measured.age
-        assert measured.new.all()

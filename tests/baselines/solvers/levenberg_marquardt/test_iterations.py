@@ -140,18 +140,6 @@ def test_follows_the_printed_iteration(name, n, jacobians, stop, far, rule):
             assert solution.iterations[row] == made
 
 
-@pytest.mark.parametrize(("name", "n"), [("varga7-fast", 2), ("zhang6-lspb", 7)])
-def test_without_damping_the_first_shift_of_mfapc_is_that_of_mfac(name, n):
-    """(38): whatever lies behind the first point."""
-    scenario = ikgym.scenarios.get(name)
-    batch = problems(scenario, n, far=0.05)
-    numbers = {"rule": "constant", "damping": 0.0, "iterations": 4}
-    one = solve("mfac", scenario, batch, **numbers)
-    other = solve("mfapc", scenario, batch, horizon=n, stop="first_point", **numbers)
-    np.testing.assert_array_equal(one.qdot, other.qdot)
-    np.testing.assert_array_equal(one.iterations, other.iterations)
-
-
 def sliding_arm(n):
     """Joints that slide: F is linear and J constant; one of them slides along x."""
     axes = np.eye(3)[:1] if n == 1 else np.random.default_rng(3).normal(size=(n, 3))
@@ -170,31 +158,6 @@ def test_with_one_point_it_is_mfac(one_step):
         one, other = solve("mfac", scenario, batch, **given), solve("mfapc", scenario, batch, horizon=1, **given)
         for mine, theirs in zip((*one[:1], *one.memory), (*other[:1], *other.memory), strict=True):
             np.testing.assert_array_equal(mine, theirs)
-
-
-def test_with_damping_the_points_ahead_pull_it_past_the_first():
-    """One prismatic joint, two points v apart: the rest point of the iteration is λ v / (g + 2λ) past the first."""
-    nominal = np.array([[[1.0, 0, 0], [1.3, 0, 0]]])
-    numbers = {"horizon": 2, "rule": "constant", "damping": 0.5, "iterations": 200}
-    solution = solve("mfapc", sliding_arm(1), batch_of(sliding_arm(1), np.zeros((1, 1)), nominal), **numbers)
-    assert solution.qdot[0, 0] == pytest.approx(1.0 + 0.5 * 0.3 / (1 + 2 * 0.5), rel=1e-12)
-    assert solution.status[0] == Status.ITERATION_LIMIT
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.5])
-def test_error_on_a_ramp(damping):
-    """(10): one step a period leaves U diag(λ/σ²) Uᵀ v, for a ramp of velocity v."""
-    scenario = sliding_arm(4)
-    policy = baselines.make("mfac", scenario, rule="constant", damping=damping, one_step=True)
-    velocity, q = np.array([0.02, -0.05, 0.03]), np.zeros(4)
-    first = scenario.model.forward(q)[1]
-    for k in range(400):
-        target = first + (k + 1) * velocity
-        solution = policy.solve(batch_of(scenario, q[None], target[None, None]), policy.memory(1))
-        q = q + scenario.dt * solution.qdot[0]
-    u, sigma, _ = np.linalg.svd(scenario.model.jacobian(q)[:3])
-    wanted = u @ np.diag(damping / sigma**2) @ u.T @ velocity
-    np.testing.assert_allclose(target - scenario.model.forward(q)[1], wanted, atol=1e-13)
 
 
 def status_of(name, nominal, q=(0.3, 0.4, 0.5), scenario=HELIX, **numbers):
