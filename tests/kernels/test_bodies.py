@@ -13,6 +13,7 @@ from ikgym.arms.bodies import Bodies
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from ikgym.kernels.bodies import near_rows
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
+from tests.arms.drawing import postures
 from tests.judge import FAR, Judge
 
 #: A step of joint coordinates, and how much a gradient changes over ten of them where there is no kink.
@@ -44,11 +45,6 @@ RAIL = ikgym.Arm(
 ARMS = {"panda-hand": ikgym.arms.get("panda-hand"), "rail": RAIL}
 
 every_arm = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
-
-
-def postures(arm, count):
-    """Drawn evenly between the limits. Shape (count, n)."""
-    return np.random.default_rng(0).uniform(arm.lower, arm.upper, (count, arm.joints))
 
 
 def near(arm, q, obstacles=OBSTACLES, within=np.inf, most=None):
@@ -137,7 +133,8 @@ def test_bad_input_is_refused():
 def test_plain_python_measures_the_same():
     code = (
         "import json, warnings; warnings.simplefilter('ignore')\n"
-        "from tests.kernels.test_bodies import OBSTACLES, RAIL, near, postures\n"
+        "from tests.arms.drawing import postures\n"
+        "from tests.kernels.test_bodies import OBSTACLES, RAIL, near\n"
         "print(json.dumps([[p, d, *g] for row in near(RAIL, postures(RAIL, 5)) for d, p, g in row]))"
     )
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}

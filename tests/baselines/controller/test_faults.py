@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines import Controller
+from baselines import Controller, Drives
+from docs.loop import DrivenArm
 from tests.baselines.controller.circles import circle
 
-DELAY, LAG, WARM, AFTER = 2, 0.02, 150, 60
+DRIVES, WARM, AFTER = Drives(2, 0.02), 150, 60
 
 
 # What each fault makes of a measurement, and whether a stop is due: None where it may be or not.
@@ -53,38 +54,29 @@ def wrong_pose(rng, q, past):
 FAULTS = (not_finite, stale, jump, outside, swapped, dropped, wrong_pose)
 
 
-class Arm:
-    """An arm whose drives have a delay and a lag, and hold the last command where none comes."""
-
-    def __init__(self, scenario):
-        self.share, self.dt = 1.0 - np.exp(-scenario.dt / LAG), scenario.dt
-        self.q, self.qdot = np.array(scenario.start), np.zeros(scenario.joints)
-        self.waiting, self.past = [np.zeros(scenario.joints)] * (DELAY + 1), [self.q]
-
-    def move(self, command=None):
-        self.waiting = [*self.waiting[1:], self.waiting[-1] if command is None else command]
-        self.qdot = self.qdot + self.share * (self.waiting[0] - self.qdot)
-        self.q = self.q + self.dt * self.qdot
-        self.past.append(self.q)
-
-
 def faulty(scenario, controller, nominal, kind, rng):
     """Plays an episode with a fault of one to three periods: commands, and whether a stop was due, period by period."""
     controller.reset()
-    arm, due, k, commands = Arm(scenario), [], 0, [np.zeros(scenario.joints)]
+    arm, commands, due = DrivenArm(DRIVES, scenario.start, scenario.dt), [np.zeros(scenario.joints)], []
+    past = [arm.q.copy()]
+
+    def move():
+        """For a period, with the last command where none comes."""
+        arm.move(commands[-1])
+        past.append(arm.q.copy())
+
     begin, lasting = WARM + int(rng.integers(0, 100)), int(rng.integers(1, 4))
     for made in range(begin + AFTER):
-        seen = {"q": arm.q, "pose": None}
+        seen = {"q": past[-1], "pose": None}
         if made >= begin and len(due) < lasting:
-            fault, so = kind(rng, arm.q, arm.past)
+            fault, so = kind(rng, past[-1], past)
             due.append(so)
             for _ in range(fault if isinstance(fault, int) else 0):
-                arm.move()
-                k += 1
+                move()
             seen |= fault if isinstance(fault, dict) else {}
-        commands.append(controller.step(seen.pop("q"), seen.pop("pose"), nominal[k + 1 :][: controller.ahead], **seen))
-        arm.move(commands[-1])
-        k += 1
+        ahead = nominal[len(past) :][: controller.ahead]
+        commands.append(controller.step(seen.pop("q"), seen.pop("pose"), ahead, **seen))
+        move()
     return np.array(commands), due
 
 

@@ -1,7 +1,5 @@
 """Episodes that are played together are those that are played alone."""
 
-import pytest
-
 import baselines
 import ikgym
 from baselines.episodes import rollout, rollouts
@@ -22,21 +20,6 @@ def assert_same(together, alone):
     assert len(together.time_ns) == 0
     for name, value in fields(together).items():
         assert identical(value, fields(alone)[name]), name
-
-
-def noisy(name):
-    return ikgym.scenarios.get(name).replace(steps=STEPS, plant=ikgym.Plant(noise=0.1))
-
-
-@pytest.mark.parametrize("name", ["dls", "mfac", "smoothed"])
-def test_together_as_alone(name):
-    """Whatever the policy: the contract of all policies has batches that equal single calls."""
-    scenario = noisy("varga7-random")
-    policy = baselines.make(name, scenario)
-    together = rollouts(scenario, policy, SEEDS)
-    for seed, episode in zip(SEEDS, together, strict=True):
-        assert_same(episode, rollout(scenario, policy, seed))
-    assert (together[0].q != together[1].q).any()
 
 
 def test_points_that_are_held_and_a_longer_preview():

@@ -8,22 +8,18 @@ import pytest
 import ikgym
 from baselines.solvers.rivals.model_files import TIP, mjcf, roll_pitch_yaw, urdf
 from ikgym.kernels.rotations import rodrigues
+from tests.arms.drawing import postures
 from tests.limited import limited
 
 ARMS = [*map(ikgym.arms.get, ("panda-3", "tiago", "puma560")), limited().arm]
 every_arm = pytest.mark.parametrize("arm", ARMS, ids=[arm.name for arm in ARMS])
 
 
-def postures(arm, number=5):
-    low, high = np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0)
-    return np.random.default_rng(0).uniform(low, high, (number, arm.joints))
-
-
 @every_arm
 def test_mjcf_has_the_kinematics_and_the_position_limits(arm):
     model = mujoco.MjModel.from_xml_string(mjcf(arm))
     data = mujoco.MjData(model)
-    for q in postures(arm):
+    for q in postures(arm, 5):
         data.qpos = q
         mujoco.mj_kinematics(model, data)
         rotation, position = arm.forward(q)
@@ -41,7 +37,7 @@ def test_mjcf_has_the_kinematics_and_the_position_limits(arm):
 def test_urdf_has_the_kinematics_and_the_limits(arm):
     model = pin.buildModelFromXML(urdf(arm))
     data = model.createData()
-    for q in postures(arm):
+    for q in postures(arm, 5):
         pin.framesForwardKinematics(model, data, q)
         tool = data.oMf[model.getFrameId(TIP)]
         rotation, position = arm.forward(q)

@@ -14,6 +14,7 @@ from baselines.solvers.rivals.model_files import geom_name, mjcf, urdf
 from baselines.solvers.rivals.solids import geometry_model, solids_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles import Capsule, HalfSpace, Sphere
+from tests.arms.drawing import postures
 from tests.baselines.making import circle, made
 
 #: A sphere and a capsule next to a circle's boxes, and a wall that is askew.
@@ -27,10 +28,6 @@ OTHERS = (
 def shelf():
     scenario = ikgym.scenarios.get("panda-shelf")
     return scenario.replace(obstacles=(*scenario.obstacles, *OTHERS))
-
-
-def postures(arm, number=50):
-    return np.random.default_rng(0).uniform(arm.lower, arm.upper, (number, arm.joints))
 
 
 def test_pairs_are_those_of_the_bodies_and_of_the_obstacles_that_are_checked():
@@ -81,7 +78,7 @@ def test_coal_mujoco_and_a_urdf_measure_the_clearance_of_the_arm():
         pinocchio_measures(urdf(arm, solids), solids, names),
         mujoco_measures(mjcf(arm, solids), solids),
     ]
-    each = [(q, float(arm.clearance(q, scenario.obstacles)[0])) for q in postures(arm)]
+    each = [(q, float(arm.clearance(q, scenario.obstacles)[0])) for q in postures(arm, 50)]
     clear = [pair for pair in each if pair[1] > 0.0]  # what is measured inside of each other differs
     assert len(clear) > 10
     for q, distance in clear:
