@@ -41,12 +41,6 @@ def test_obstacles_make_collisions_matter():
     assert not SCENARIO.replace(collisions=False).collides
 
 
-def test_replace_checks_a_copy():
-    assert [one.name for one in SCENARIO.replace(obstacles=[BALL]).obstacles] == ["ball"]
-    with pytest.raises(InvalidInputError, match="an arm with bodies"):
-        SCENARIO.replace(arm=ARM.replace(bodies=Bodies()))
-
-
 def test_what_touches_the_start_is_refused_at_reset():
     near = BALL.replace(position=ARM.forward(SCENARIO.start_of())[1])
     with pytest.raises(InvalidInputError, match="'hand' and 'ball'"):
