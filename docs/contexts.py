@@ -74,7 +74,7 @@ class Command:
 
 
 def measured(*, only_new: bool = False) -> list[Line]:
-    """The table: costs relative to the policy that is told the plant, and the share of the gap to it that is closed."""
+    """The table: costs relative to the policy that knows the plant, and the share of the gap to it that is closed."""
     old = {line["policy"]: line for line in lines("contexts")}
     told, out = _solver(TOLD), []
     for name in POLICIES:

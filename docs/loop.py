@@ -51,7 +51,7 @@ class DrivenArm:
 
     Args:
         drives: Their delays and lags.
-        q: Where they stand at first, in [rad] or [m]. Shape (n,).
+        q: Their start, in [rad] or [m]. Shape (n,).
         period: Δt in [s].
     """
 
@@ -95,14 +95,14 @@ def peaks(scenario: ikgym.Scenario, policy: str = "qp") -> Any:
     return np.abs(baselines.track(scenario, policy).qdot).max(axis=0)
 
 
-def line(policy: str, told: str, period: float, lag: float | None, delay: int) -> Line:
+def line(policy: str, given: str, period: float, lag: float | None, delay: int) -> Line:
     """One line of the table."""
     arm, drives = ikgym.arms.get("panda"), Drives(delay, lag)
     scenario = circle(arm.replace(acceleration_limit=np.full(7, np.inf)), arm.home, period)
     lost = Guards(position_error=None, orientation_error=None)
-    known = {"perfect": Drives(), "given": drives, "identify": "identify"}[told]
+    known = {"perfect": Drives(), "given": drives, "identify": "identify"}[given]
     errors, commands = played(Controller(scenario, policy, known, guards=lost), scenario, drives)
-    case = {"policy": policy, "drives": told, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
+    case = {"policy": policy, "drives": given, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
     times = (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max()
     return case | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}
 

@@ -1,8 +1,8 @@
 """Measures tables of `docs/results`: ``python -m docs.measure cost_time periods``.
 
 A table with a module of its name in this folder is what its `measured` returns; a new one begins as an empty CSV file.
-Others say by their lines what is played: scenario, policy, episodes, noise seeds and seeds. Where a label stands for a
-policy, the column `spec` has what is played. To add a policy, add a line with these columns; --new measures those
+Others say by their lines what is played: scenario, policy, episodes, noise seeds and seeds. Where `policy` is a label,
+the column `spec` has what is played. To add a policy, add a line with these columns; --new measures those
 alone. Each policy is timed in two episodes, on one core: times compare within one run on an idle machine. A killed
 measurement continues. Trained agents are read from ``runs/NAME/seed-*``; a line whose scenario or agent is missing here
 stays as it is. Then ``python -m docs.tables`` and ``python -m docs.pictures`` write the pages.

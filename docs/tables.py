@@ -94,7 +94,7 @@ def measured(name: str, *words: str) -> str:
 
 
 def table(words: str) -> str:
-    """The table, or the text, of what stands behind `<!-- table:`."""
+    """The table, or the text, of the words after `<!-- table:`."""
     name, *rest = shlex.split(words)
     if name.startswith("results/"):
         return measured(name.removeprefix("results/").removesuffix(".csv"), *rest)

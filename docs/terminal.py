@@ -24,7 +24,7 @@ def terminal() -> Iterator[None]:
 
 
 def called(arguments: Sequence[str]) -> bool:
-    """Calls the command with what stands behind ``ikgym``; whether it failed."""
+    """Calls the command with the words after ``ikgym``; whether it failed."""
     return bool(main(arguments))
 
 

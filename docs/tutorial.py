@@ -65,8 +65,8 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
 @contextlib.contextmanager
 def _no_names_of_snippets() -> Iterator[None]:
     """The registry of a new process: a command knows no policy that a snippet has registered."""
-    own = {name: place for name, place in registry._import_paths.items() if place.startswith("baselines.")}
-    with mock.patch.object(registry, "_import_paths", own), mock.patch.object(registry, "_classes", {}):
+    ours = {name: place for name, place in registry._import_paths.items() if place.startswith("baselines.")}
+    with mock.patch.object(registry, "_import_paths", ours), mock.patch.object(registry, "_classes", {}):
         yield
 
 

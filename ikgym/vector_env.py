@@ -76,8 +76,8 @@ class RedundantIKVectorEnv(
             )
         self.num_envs = whole_number("num_envs", num_envs, at_least=1)
         self.autoreset_mode = checked_mode(autoreset_mode)
-        own = {"render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
-        self.metadata = RedundantIKEnv.metadata | own
+        specific = {"render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
+        self.metadata = RedundantIKEnv.metadata | specific
         one = self._set_arms(scenario, self.num_envs, preview, commands, lost_distance, render_mode)
         if max_episode_steps is not None:
             self._most_steps = min(self._most_steps, whole_number("max_episode_steps", max_episode_steps, at_least=1))
@@ -205,13 +205,13 @@ class RedundantIKVectorEnv(
             "metadata": RedundantIKEnv.metadata | {"render_fps": self.metadata["render_fps"]},
             "render_mode": self.render_mode,
         }
-        own = ("np_random", "np_random_seed")
-        if name in own:
+        specific = ("np_random", "np_random_seed")
+        if name in specific:
             return getattr(self, name)  # type: ignore[no-any-return]  # one a row
         if name not in shared:
             raise NoAttributeError(
                 f"The arms of a native vector environment have no {name!r}: they are reset, stepped and seen together. "
-                f"Available: {', '.join((*shared, *own))}. Environments one by one: gym.make_vec(…, "
+                f"Available: {', '.join((*shared, *specific))}. Environments one by one: gym.make_vec(…, "
                 "vectorization_mode='sync')."
             )
         return (shared[name],) * self.num_envs

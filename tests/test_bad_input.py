@@ -166,10 +166,10 @@ def test_bad_values_of_fields_are_refused_in_one_line(good):
 @pytest.mark.parametrize("good", GOOD, ids=lambda one: type(one).__name__)
 def test_copies_are_the_same_bit_for_bit_and_never_change(good):
     given = {name: np.array(value) for name, value in good._fields().items() if isinstance(value, np.ndarray)}
-    own = good.replace(**given)
+    changed = good.replace(**given)
     for array in given.values():
         array[...] = 0.0
-    for other in (own, pickle.loads(pickle.dumps(good)), copy.deepcopy(good)):
+    for other in (changed, pickle.loads(pickle.dumps(good)), copy.deepcopy(good)):
         assert identical(fields(other), fields(good))
         public = [value for name, value in vars(other).items() if name[0] != "_"]
         arrays = [one for value in public for one in (value if isinstance(value, tuple) else [value])]

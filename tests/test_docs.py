@@ -114,10 +114,10 @@ def test_no_page_has_snippets_that_nobody_runs():
 def test_the_policy_of_the_readme_follows_the_reference():
     snippet = files()["mine.py"]
     assert len(statements(snippet)) <= 15
-    own: dict = {}
-    exec(snippet, own)
+    names: dict = {}
+    exec(snippet, names)
     scenario = ikgym.scenarios.get("varga7-slow").replace(steps=200)
-    policy = own["Proportional"](scenario)
+    policy = names["Proportional"](scenario)
     env = gym.make("RedundantIK-v0", scenario=scenario, preview=policy.preview)
     (observation, _), state, errors = env.reset(seed=0), None, []
     for _ in range(scenario.steps):
@@ -131,8 +131,8 @@ def test_what_is_ones_own_is_evaluated_by_one_command_each(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.delitem(sys.modules, "mine", raising=False)
-    own = files()
-    for name, text in own.items():
+    names = files()
+    for name, text in names.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     wanted = [words for words in commands() if words[0] == "evaluate" and any("mine" in word for word in words)]
     assert len(wanted) == 2

@@ -114,7 +114,7 @@ class Walk:
         return self.table[np.minimum(self.made, len(self.table) - 1)]
 
     def check_still(self, before, stopped):
-        """An arm that is stopped stands where it was, and remains so."""
+        """An arm that is stopped stays where it was."""
         assert not (stopped & ~self.stopped).any()
         np.testing.assert_array_equal(self.seen["q"][self.stopped], before[self.stopped])
         assert not self.seen["qdot"][self.stopped].any()

@@ -194,7 +194,7 @@ def test_human_mode_without_windows_is_silent_and_says_so_once(caplog):
 
 
 def test_a_window_is_drawn_on_until_it_is_closed(monkeypatch):
-    """The backend of the tests has no windows; that pyplot keeps the figure stands for one."""
+    """The backend of the tests has no windows; a figure that pyplot keeps takes the place of one."""
     monkeypatch.setattr(renderer.backend_registry, "resolve_backend", lambda name: (name, "pretended"))
     monkeypatch.setattr(renderer.Figure, "show", lambda _: None)
     monkeypatch.setattr(renderer, "INTERVAL", 0.0)

@@ -90,7 +90,7 @@ def test_episodes_begin_with_the_frames_that_are_shown_alone(name):
 
 
 def test_threads_do_not_disturb_each_other(monkeypatch):
-    """All rows of a step in several threads against the same in one."""
+    """All rows of a step in several threads against one."""
     monkeypatch.setattr(threads, "count_cores", lambda: 4)
     rows, outcomes = 400, {}
     actions = np.random.default_rng(0).uniform(-1, 1, (5, rows, 7))

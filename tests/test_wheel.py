@@ -66,7 +66,7 @@ def installed(tmp_path_factory):
     (wheel,) = folder.glob("*.whl")
     venv.create(folder / "venv", with_pip=False, symlinks=True)
     binaries = folder / "venv" / "bin"
-    own = Path(
+    site = Path(
         subprocess.run(
             [binaries / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
             check=True,
@@ -75,12 +75,12 @@ def installed(tmp_path_factory):
         ).stdout.strip()
     )
     # The path alone: what lies there as .pth files, such as that of an editable installation, is not heeded.
-    (own / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     target = [*quiet, "--python", str(binaries / "python"), "install", "--no-deps", "--no-index", "--force-reinstall"]
     subprocess.run([*target, "--ignore-installed", str(wheel)], check=True)
     # Kernels of the same source have the same machine code.
     for code in (code for package in PACKAGES for code in (ROOT / package).rglob("__pycache__/*.nb[ic]")):
-        (copy := own / code.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
+        (copy := site / code.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(code, copy)
     elsewhere = folder / "elsewhere"
     elsewhere.mkdir()
@@ -98,12 +98,12 @@ def installed(tmp_path_factory):
         assert done.returncode == 0, done.stderr
         return done
 
-    return run, own, elsewhere
+    return run, site, elsewhere
 
 
 @pytest.mark.slow
 def test_the_environment_runs_from_the_wheel(installed):
-    run, own, _ = installed
+    run, site, _ = installed
     code = (
         "import gymnasium, baselines\n"
         "env = gymnasium.make('ikgym:RedundantIK-v0', scenario='varga7-fast', preview=1)\n"
@@ -115,7 +115,7 @@ def test_the_environment_runs_from_the_wheel(installed):
     )
     answer, places = run("python", "-c", code).stdout.splitlines()
     assert answer == "True"
-    assert all(Path(place).is_relative_to(own) for place in places.split())
+    assert all(Path(place).is_relative_to(site) for place in places.split())
 
 
 @pytest.mark.slow

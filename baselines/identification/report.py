@@ -112,7 +112,7 @@ class Identified:
         """Rows of a table, the heads first: numbers with their standard deviations, and errors in free run."""
         head = ("joint", "delay [periods]", "lag [ms]", "gain", "drive", "error [%]")
         rows: list[tuple[str, ...]] = [(*head, "test [%]") if test is not None else head]
-        own, other = self.errors(self.log), None if test is None else self.errors(test)
+        here, other = self.errors(self.log), None if test is None else self.errors(test)
         for j, joint in enumerate(self.joints):
             lag, (late, slow, factor, _) = joint.lag, joint.lag.deviations
             numbers = (
@@ -122,7 +122,7 @@ class Identified:
             )
             words = numbers if joint.moved else ("–", "–", "–")
             kind = "low order" if self.shaped and joint.moved else "lag"
-            row = (joint.name, *words, kind, f"{100 * own[j]:.3g}")
+            row = (joint.name, *words, kind, f"{100 * here[j]:.3g}")
             rows.append(row if other is None else (*row, f"{100 * other[j]:.3g}"))
         return rows
 

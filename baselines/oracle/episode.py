@@ -186,7 +186,7 @@ def _clearance(scenario: Scenario, seed: int) -> Clearance | None:
     """Bodies and obstacles of an episode, at each of its steps; None where touching does not matter."""
     if not scenario.collides:
         return None
-    own = scenario.replace(obstacles=scenario.obstacles_of(seed))
-    boxes, checked = own.obstacle_rows(scenario.steps + 1), own.surroundings.checked
+    drawn = scenario.replace(obstacles=scenario.obstacles_of(seed))
+    boxes, checked = drawn.obstacle_rows(scenario.steps + 1), drawn.surroundings.checked
     shapes = scenario.arm.bodies.shapes
     return Clearance(shapes, boxes, checked, sweep_bodies(scenario.arm), CLEARANCE, CLEARANCE + INFLUENCE)

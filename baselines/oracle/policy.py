@@ -52,7 +52,7 @@ class Oracle(PrivilegedPath):
         if strips(self.scenario):
             raise InvalidInputError(
                 f"{self.name} plays a joint path that was found {NOTE}; scenario {self.scenario.name!r}: expected "
-                f"ideal ones, got {self.scenario.plant}. The reference there is told."
+                f"ideal ones, got {self.scenario.plant}. The reference there is `told`."
             )
 
     @classmethod

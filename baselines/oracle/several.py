@@ -110,7 +110,7 @@ def _made(scenario: Scenario, spec: str) -> SolverPolicy:
 
 
 def _check(one: Wanted, optimum: Optimum) -> None:
-    """Checks that this machine charges the same for a path."""
+    """Checks that this machine computes the same cost of a path."""
     episode = EpisodeProblem.of(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
     _, cost = episode.play(optimum.qdot)
     if not math.isclose(cost, optimum.cost, rel_tol=TOLERANCE, abs_tol=MEANINGLESS):

@@ -32,19 +32,19 @@ def starts(scenario: Scenario) -> FloatArray:
     Raises:
         InvalidInputError: No posture at the first pose is clear.
     """
-    own, found = scenario.first_q(scenario.trajectory)[None], solutions(scenario)
+    usual, found = scenario.first_q(scenario.trajectory)[None], solutions(scenario)
     if scenario.collides:
-        own, found = _clear(scenario, own, found)
+        usual, found = _clear(scenario, usual, found)
     if not len(found):
-        return own
+        return usual
     settled = played(_held(scenario), _middlemost(scenario.arm, found))
     still = settled.q[-1][settled.position_error[-1] < 1e-6]
-    return _distinct(scenario.arm, _distinct(scenario.arm, own, still, BRANCHES), found, BRANCHES)
+    return _distinct(scenario.arm, _distinct(scenario.arm, usual, still, BRANCHES), found, BRANCHES)
 
 
-def _clear(scenario: Scenario, own: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _clear(scenario: Scenario, usual: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Those that touch nothing: the scenario's start, of shape (1, n), and of others, of shape (k, n)."""
-    every = np.vstack([own, found])
+    every = np.vstack([usual, found])
     pairs = closest(scenario.arm, every, scenario.obstacle_rows(1), scenario.surroundings.checked)
     clear = pairs.distances > 0.0
     if not clear.any():
@@ -55,7 +55,7 @@ def _clear(scenario: Scenario, own: FloatArray, found: FloatArray) -> tuple[Floa
             f"{len(every)}; in the best of them {first!r} and {second!r} overlap by {-1e3 * pairs.distances[best]:.3g} "
             "mm. A pair that may touch is named by `ignored` of the bodies or of the obstacle."
         )
-    return own[clear[:1]], found[clear[1:]]
+    return usual[clear[:1]], found[clear[1:]]
 
 
 def solutions(scenario: Scenario) -> FloatArray:

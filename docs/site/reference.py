@@ -28,8 +28,8 @@ def public_names(module: ModuleType) -> list[str]:
 
     A class is described once.
     """
-    own = getattr(module, "__all__", None) or [n for n, x in vars(module).items() if _of(x) == module.__name__]
-    return [name for name in own if not name.startswith("_") and _described(getattr(module, name))]
+    names = getattr(module, "__all__", None) or [n for n, x in vars(module).items() if _of(x) == module.__name__]
+    return [name for name in names if not name.startswith("_") and _described(getattr(module, name))]
 
 
 def _of(thing: Any) -> str | None:

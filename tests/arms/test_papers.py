@@ -104,7 +104,7 @@ def test_khan_shifts_are_those_of_eq_3_14_and_eq_3_15(name, l1, l2, l3, tool):
 
 def test_puma_in_its_textbook_postures():
     arm = arms.get("puma560")
-    # Upper arm level along x, forearm upright, all of it beside the shoulder.
+    # Upper arm level along x, forearm upright, all of it next to the shoulder.
     np.testing.assert_allclose(
         arm.forward(np.zeros(6))[1], [0.4318 + 0.0203, -0.15005, 0.67183 + 0.4318], rtol=0, atol=1e-15
     )

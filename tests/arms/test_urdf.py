@@ -266,7 +266,7 @@ def refused(path, message):
 @pytest.mark.parametrize(("content", "message"), BAD_FILES, ids=[message for _, message in BAD_FILES])
 def test_bad_files_are_refused(write, content, message, capfd):
     refused(write(content), message)
-    # All is found out before Pinocchio sees it, which would complain on its own.
+    # All is found out before Pinocchio sees it, which would complain otherwise.
     assert capfd.readouterr() == ("", "")
 
 

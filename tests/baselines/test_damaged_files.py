@@ -1,4 +1,4 @@
-"""Users' files with damaged or hostile content are read, or refused with one of our own errors.
+"""Users' files with damaged or hostile content are read, or refused with one of our errors.
 
 The suite tries a few of each; the environment variable IKGYM_FUZZ says how many instead, see `make fuzz`.
 """

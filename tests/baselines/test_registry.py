@@ -52,7 +52,7 @@ def unchanged(monkeypatch):
 
 @pytest.fixture
 def entry_points(monkeypatch):
-    """Stands for packages of others that are installed."""
+    """Installed packages of others."""
 
     def install(**places):
         found = [importlib.metadata.EntryPoint(name, value, registry.GROUP) for name, value in places.items()]

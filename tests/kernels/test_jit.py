@@ -190,7 +190,7 @@ print(doubled(1.0), kept_on_disk())
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no limits there that stand in for a full disk")
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits there that imitate a full disk")
 def test_a_full_disk_is_said_once_and_hinders_nothing(tmp_path):
     (tmp_path / "small.py").write_text(SMALL)
     done = python(tmp_path, "-c", FULL_DISK)

@@ -55,13 +55,13 @@ def played(scenario, commands):
             [4.0, 4.0, 4.0],
             [(0.1, 1.0, (0, 1, 1)), (0.3, 2.0, (0, 1, 0)), (0.5, 2.0, (0, 1, 0))],
         ),
-        # The joint goes as far as its stop, and stands there; it leaves at once.
+        # The joint goes as far as its stop, and rests there; it leaves at once.
         (
             one_joint(upper=0.25),
             [2.0, 2.0, 2.0, -1.0],
             [(0.2, 2.0, (0, 0, 0)), (0.25, 0.5, (1, 0, 0)), (0.25, 0.0, (1, 0, 0)), (0.15, -1.0, (0, 0, 0))],
         ),
-        # It stands, whatever the acceleration limit says, and is accelerated from there.
+        # It rests, whatever the acceleration limit says, and is accelerated from there.
         (
             one_joint(upper=0.15, acceleration=10.0),
             [1.0, 2.0, 0.0, -2.0],

@@ -76,7 +76,7 @@ def test_without_them_the_plant_is_bit_for_bit_the_same():
         Plant(**effects | {"bandwidth": (15.0,) * 7, "command_delay": (3,) * 7}, gain=1.0, resonance=math.inf)
     )
     assert identical(usual.true_q, other.true_q)
-    assert identical(usual.told, other.told)
+    assert identical(usual.infos, other.infos)
 
 
 def test_bounds_hold_without_stops():

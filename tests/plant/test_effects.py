@@ -14,25 +14,25 @@ STEPS = 60
 
 
 class Played:
-    """An episode: what is seen at each step and at the reset, what is told after each step, and what is true."""
+    """An episode: what is seen at each step and at the reset, the info after each step, and what is true."""
 
     def __init__(self, plant, command=None, steps=STEPS, seed=3, scenario=None, **made):
         self.scenario = (panda(steps=steps) if scenario is None else scenario).replace(plant=plant, steps=steps)
         env = ikgym.RedundantIKEnv(self.scenario, **made)
         rng = np.random.default_rng(0)
-        self.seen, self.told, self.true_q = [env.reset(seed=seed)[0]], [], [env._simulator.true_q[0].copy()]
+        self.seen, self.infos, self.true_q = [env.reset(seed=seed)[0]], [], [env._simulator.true_q[0].copy()]
         for k in range(steps):
             action = rng.uniform(-0.02, 0.02, env.action_space.shape[0]) if command is None else command(k)
             seen, *_, info = env.step(action)
             self.seen.append(seen)
-            self.told.append(info)
+            self.infos.append(info)
             self.true_q.append(env._simulator.true_q[0].copy())
 
     def of(self, key):
         return np.array([one[key] for one in self.seen])
 
     def told_of(self, key):
-        return np.array([one[key] for one in self.told])
+        return np.array([one[key] for one in self.infos])
 
     def poses(self, arm, q=None):
         """Task coordinates of an arm, at the true joint coordinates."""
@@ -61,7 +61,7 @@ SENSORS = {
 def test_sensors_change_what_is_seen_and_nothing_else(name, ideal):
     played = Played(Plant(**{name: SENSORS[name]}))
     assert identical(played.true_q, ideal.true_q)
-    assert identical(played.told, ideal.told)
+    assert identical(played.infos, ideal.infos)
     other = "q" if name.startswith("q") else "pose"
     for key in ("q", "qdot", "pose", "nominal", "remaining"):
         assert identical(played.of(key), ideal.of(key)) is (key != other)

@@ -63,7 +63,7 @@ def test_the_reference_is_shown_at_times_ahead(dt, steps):
 @pytest.mark.parametrize("task", ikgym.tasks.names())
 @pytest.mark.parametrize("name", ["varga7-random", "tiago-turn"])
 def test_what_an_arm_sees_of_a_task(name, task):
-    """Before a step in which the arm stands still: the errors of that step, seen from joint 1."""
+    """Before a step in which the arm is at rest: the errors of that step, seen from joint 1."""
     scenario = ikgym.scenarios.get(name).replace(task=ikgym.tasks.get(task))
     env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, coarse=50.0, fine=5.0, radian=0.5, lost_distance=None)
     arm = scenario.model

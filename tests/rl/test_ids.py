@@ -39,7 +39,7 @@ def actions_of(env, steps, seed=0):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, *env.action_space.shape)).astype(np.float32)
 
 
-def told(env, actions, seed=None):
+def outcomes(env, actions, seed=None):
     """All that an environment returns, up to the end of the episode."""
     out = [env.reset(seed=seed)[0]]
     for action in actions:
@@ -78,7 +78,7 @@ def test_made_again_from_its_specification_it_is_wrapped_once(name):
     env = gym.make(name)
     again = gym.make(env.spec)
     actions = actions_of(env, 20)
-    assert identical(told(env, actions, 4), told(again, actions, 4))
+    assert identical(outcomes(env, actions, 4), outcomes(again, actions, 4))
     assert type(again.unwrapped) is type(env.unwrapped)
     assert str(again) == str(env)
 

@@ -109,13 +109,13 @@ def test_reward_thresholds_are_measured_returns(name):
 
 @pytest.mark.parametrize("name", [TRACK, "ikgym/Payload-v0"])
 def test_returns_of_yardsticks_are_those_of_the_environment(name):
-    env, told, total = gym.make(name, lost_distance=None), [], 0.0
+    env, rows, total = gym.make(name, lost_distance=None), [], 0.0
     env.reset(seed=1)
     for _ in range(20):
         _, reward, _, _, info = env.step(np.full(7, 0.1, dtype=np.float32))
         total += reward
-        told.append([info[key] for key in ("position_error", "orientation_error", "velocity_cost")])
-    position, orientation, velocity = np.transpose(told)
+        rows.append([info[key] for key in ("position_error", "orientation_error", "velocity_cost")])
+    position, orientation, velocity = np.transpose(rows)
     episode = SimpleNamespace(position_error=position, orientation_error=orientation, velocity_cost=velocity)
     assert returns(env.unwrapped.task, [episode]) == pytest.approx([total], rel=1e-12)
 

@@ -16,7 +16,7 @@ POINTS = HOME + np.array([[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0.1]])
 
 def along(trajectory, **changes):
     given = {"dt": 0.004, **changes}
-    return ikgym.Scenario("own", PANDA, ikgym.tasks.get("position"), trajectory, start=PANDA.home, **given)
+    return ikgym.Scenario("mine", PANDA, ikgym.tasks.get("position"), trajectory, start=PANDA.home, **given)
 
 
 @pytest.mark.parametrize("path", [through(POINTS, times=[0, 1, 2.2]), through(POINTS, speed=0.1, acceleration=1.0)])
@@ -37,9 +37,9 @@ def test_what_has_no_end_has_1000_steps():
 
 def test_a_file_like_another_one_plays_its_own_path(tmp_path):
     (tmp_path / "points.csv").write_text("t,x,y,z\n0,0.5,0,0.4\n4,0.5,0.1,0.4\n", encoding="utf-8")
-    text = 'name = "own"\nlike = "panda-circle"\ntask = "position"\n[trajectory]\nkind = "csv"\nfile = "points.csv"\n'
-    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
-    scenario = ikgym.scenarios.load(tmp_path / "own.toml")
+    text = 'name = "mine"\nlike = "panda-circle"\ntask = "position"\n[trajectory]\nkind = "csv"\nfile = "points.csv"\n'
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    scenario = ikgym.scenarios.load(tmp_path / "mine.toml")
     assert scenario.steps == 4250
     scenario.save(tmp_path / "again.toml")
     assert ikgym.scenarios.load(tmp_path / "again.toml").steps == 4250
@@ -49,13 +49,13 @@ def test_a_path_that_is_cut_off_is_warned_of(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scenario = along(through(POINTS, times=[0, 1, 2.2]), steps=500)
     assert scenario.cut_off == pytest.approx(0.2)
-    scenario.save("own.toml")
-    assert main(["scenarios", "own.toml"]) == 0
+    scenario.save("mine.toml")
+    assert main(["scenarios", "mine.toml"]) == 0
     assert "2.2 s, the episode 2 s: 0.2 s are cut off" in capsys.readouterr().out
-    assert main(["evaluate", "--scenarios", "own.toml", "--policies", "dls"]) == 0
-    warned = "warning: own: the last 0.2 s of the path are cut off, since 500 steps take 2 s"
+    assert main(["evaluate", "--scenarios", "mine.toml", "--policies", "dls"]) == 0
+    warned = "warning: mine: the last 0.2 s of the path are cut off, since 500 steps take 2 s"
     assert warned in capsys.readouterr().err
-    assert main(["evaluate", "--scenarios", "own.toml", "--policies", "dls", "--steps", "5"]) == 0  # as is wanted
-    scenario.replace(steps=None).save("own.toml")
-    assert main(["evaluate", "--scenarios", "own.toml", "--policies", "dls"]) == 0
+    assert main(["evaluate", "--scenarios", "mine.toml", "--policies", "dls", "--steps", "5"]) == 0  # as is wanted
+    scenario.replace(steps=None).save("mine.toml")
+    assert main(["evaluate", "--scenarios", "mine.toml", "--policies", "dls"]) == 0
     assert "warning" not in capsys.readouterr().err

@@ -9,7 +9,7 @@ from ikgym import scenarios
 
 ARMS = ("panda", "iiwa14", "tiago")
 FAMILIES = ("circle", "lemniscate", "square", "raster", "line", "turn", "singular", "edge", "fast", "glue")
-#: The control points that are singular postures: a stretched elbow, an aligned wrist. Two more stand before the first.
+#: The control points that are singular postures: a stretched elbow, an aligned wrist. Two more precede the first.
 STRETCHED, ALIGNED = 2 + 5, 2 + 5 + 20
 each_arm = pytest.mark.parametrize("arm", ARMS)
 

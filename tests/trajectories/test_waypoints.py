@@ -76,7 +76,7 @@ TIMING = {"speed": 1.0, "acceleration": 1.0}
     ],
 )
 def test_the_largest_file_takes_seconds(rows, given, tmp_path):
-    """The time of the process, since other tests run beside it; samples of all intervals at once took 35 s, 5.9 GiB."""
+    """The time of the process, since other tests run meanwhile; samples of all intervals at once took 35 s, 5.9 GiB."""
     s = 0.01 * np.arange(rows)
     columns = [np.cos(s), np.sin(s), 0.01 * s, np.cos(s), np.sin(s), 0.0 * s, 0.0 * s, s][: 7 if given else 8]
     file, head = tmp_path / "points.csv", ",".join(HEAD.split(",")[: len(columns)]).strip()

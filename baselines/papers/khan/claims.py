@@ -113,10 +113,10 @@ def w_blocks_joints(runs: Runs) -> Finding:
 
 
 def w_keeps_precision(runs: Runs) -> Finding:
-    """Beside the run without 𝒲, and beside the path's extent."""
+    """Against the run without 𝒲, and against the path's extent."""
     before, after = _weighted(runs, Q1, BLOCKED)
     share = after.largest_position / extent(runs.scenario(Q1).nominal()[:, 9:])
-    holds = {"beside the run without W": not after.worse(before), "beside the extent": share < SAME}
+    holds = {"against the run without W": not after.worse(before), "against the extent": share < SAME}
     return Finding(holds, {**_before_and_after(before, after), "of the extent [%]": 100.0 * share})
 
 
@@ -275,7 +275,7 @@ def no_exploration(runs: Runs) -> Finding:
         shares[name] = float((second < SAME * fastest).mean())
     holds = {
         "the method": shares[METHOD] == 0.0,
-        "beside inversion": all(shares[name] > shares[METHOD] for name in CLOSED_LOOPS),
+        "against inversion": all(shares[name] > shares[METHOD] for name in CLOSED_LOOPS),
     }
     return Finding(holds, scaled(shares, "%"))
 

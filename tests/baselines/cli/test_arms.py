@@ -14,7 +14,7 @@ from baselines.cli import main
 from baselines.solvers.rivals.model_files import urdf
 
 ROBOTS = Path(__file__).parents[2] / "robots"
-#: Chains of the robots, the number of links that can be the tip, and one that stands above all others of its length.
+#: Chains of the robots, the number of links that can be the tip, and one that comes before all others of its length.
 CHAINS = {
     "ur10": ("base_link", "tool0", 6, 2),
     "ur10_rail": ("world", "tool0", 7, 3),

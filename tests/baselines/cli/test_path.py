@@ -204,7 +204,7 @@ def test_a_motion_along_the_whole_path_where_no_start_branch_leads_to_its_end(ca
 
 
 def test_a_free_rotation_is_suggested_where_it_helps(capsys):
-    """The tool has to turn by more than the last joint can, beside a base that it cannot go around."""
+    """The tool has to turn by more than the last joint can, next to a base that it cannot go around."""
     turns = [(0.0, 1.0), (0.8, 0.6), (1.0, 0.0), (0.8, -0.6), (0.0, -1.0), (-0.8, -0.6), (-1.0, 0.0)]
     lines = [f"{0.4 + 0.02 * i}, 0.1, 0.4, 0, {c}, {s}, 0" for i, (s, c) in enumerate(turns)]
     Path("weld.csv").write_text("\n".join(["x, y, z, qw, qx, qy, qz", *lines]))
@@ -238,13 +238,13 @@ MESH = '<collision><geometry><mesh filename="package://parts/rod.stl"/></geometr
 
 def arm_file(*shapes):
     """A URDF file of an arm whose four links have these shapes."""
-    Path("own.urdf").write_text(f'<robot name="own"><link name="l0"/>{JOINTS.format(*shapes)}</robot>')
+    Path("mine.urdf").write_text(f'<robot name="mine"><link name="l0"/>{JOINTS.format(*shapes)}</robot>')
 
 
 def test_no_verdict_about_links_that_were_not_looked_at(capsys, tmp_path):
     """A file without shapes, or with meshes, was driven through the obstacle."""
     Path("room.toml").write_text(ROOM)
-    words = ["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02", "--obstacles", "room.toml"]
+    words = ["path", "weld.csv", "--arm", "mine.urdf", "--speed", "0.1", "--dt", "0.02", "--obstacles", "room.toml"]
     arm_file("", "", "", "")
     assert main(words) == 2
     assert "got none on 'l1', 'l2', 'l3', 'l4'. 'l1': it has no shape." in capsys.readouterr().err
@@ -256,7 +256,7 @@ def test_no_verdict_about_links_that_were_not_looked_at(capsys, tmp_path):
     trimesh.creation.capsule(0.3, 0.05).export(folder / "rod.stl")
     assert main([*words, "--packages", "elsewhere"]) == 2
     assert "'l4' and 'block' overlap" in capsys.readouterr().err
-    assert main(["arms", "own.urdf", "--packages", "elsewhere"]) == 0
+    assert main(["arms", "mine.urdf", "--packages", "elsewhere"]) == 0
     said = re.sub(r"\s+", " ", capsys.readouterr().out)
     assert re.search(r"around meshes, in times the volume of the hull: l2 1\S*, l3 1\S*, l4 1", said)
     arm_file("", "", "", "")
@@ -266,7 +266,7 @@ def test_no_verdict_about_links_that_were_not_looked_at(capsys, tmp_path):
 
 def test_an_arm_that_cannot_be_looked_at_is_said_not_to_be(capsys):
     arm_file(BALL.format("sphere"), "", "", "")
-    assert main(["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
+    assert main(["path", "weld.csv", "--arm", "mine.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
     said = re.sub(r"\s+", " ", capsys.readouterr().out)
     assert "bodies, which do not count here: 1 on the arm" in said
     assert "NOT LOOKED AT: 'l2': it has no shape; 'l3'" in said
@@ -275,9 +275,9 @@ def test_an_arm_that_cannot_be_looked_at_is_said_not_to_be(capsys):
 def test_without_obstacles_no_package_for_meshes_is_needed(capsys, monkeypatch):
     arm_file(BALL.format("sphere"), MESH, MESH, MESH)
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    assert main(["path", "weld.csv", "--arm", "own.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
+    assert main(["path", "weld.csv", "--arm", "mine.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
     assert "NOT LOOKED AT: 'l2': its mesh" in re.sub(r"\s+", " ", capsys.readouterr().out)
-    assert main(["arms", "own.urdf"]) == 0
+    assert main(["arms", "mine.urdf"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ SPREAD = Drives(3, tuple(np.linspace(0.005, 0.04, 7)))
 @pytest.mark.parametrize("dt", [pytest.param(1e-3, marks=pytest.mark.slow), 4e-3, 8e-3])
 @pytest.mark.parametrize("known", [True, False])
 def test_drives_that_differ_by_joint(dt, known):
-    """Lags of 5 to 40 ms: each joint is followed by its own; those known are no worse than those identified."""
+    """Lags of 5 to 40 ms: each joint has its model; those known are no worse than those identified."""
     scenario = circle("panda", dt, seconds=2.4)
     controller = Controller(scenario, drives=SPREAD if known else "identify")
     errors, _ = played(controller, scenario, SPREAD)

@@ -25,7 +25,7 @@ def scenario(name="varga7-fast"):
 
 
 def driven(which, name, pose, **parameters):
-    """Joint coordinates of a loop of our own, after each step."""
+    """Joint coordinates of a plain loop, after each step."""
     controller = Controller(which, (name, parameters), Drives(), guards=LOST, steps=STEPS)
     nominal, q = which.nominal(0, controller.ahead), np.array(which.first_q(which.trajectory))
     out = []

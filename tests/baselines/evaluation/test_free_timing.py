@@ -1,4 +1,4 @@
-"""Policies with free timing in the table: time and error along the path, beside the costs on the clock."""
+"""Policies with free timing in the table: time and error along the path, and the costs on the clock."""
 
 import csv
 import json

@@ -136,7 +136,9 @@ def test_lines_fit_the_width_and_columns_that_do_not_are_named():
     for width in (80, 120):
         text = table(WIDE, [Skipped("zhang3-helix", "follow_nominal", "word " * 60)], width=width)
         assert max(len(line.replace("\u0307", "")) for line in text.split("\n")) <= width
-        assert "rhc_gradient:horizon=50,alpha_max=1.2345e-05,alpha_factor=1.234\n" in text  # in full, on its own line
+        assert (
+            "rhc_gradient:horizon=50,alpha_max=1.2345e-05,alpha_factor=1.234\n" in text
+        )  # in full, on a separate line
     narrow, wide = table(WIDE, width=80), table(WIDE, width=200)
     assert "left out" not in wide
     gone, head = narrow.partition("left out at 80 characters a line: ")[2], narrow.splitlines()[1].split()

@@ -92,7 +92,7 @@ def test_a_servo_of_higher_order_becomes_a_drive_of_low_order():
 
 
 def test_friction_and_a_dead_band_show(log):
-    """Here each joint loses 5 mrad/s, and stands still below that."""
+    """Here each joint loses 5 mrad/s, and is at rest below that."""
     speed = np.diff(log.q, axis=0) / PERIOD
     lost = np.sign(speed) * np.maximum(np.abs(speed) - 5e-3, 0.0)
     q = log.q[0] + PERIOD * np.concatenate([np.zeros((1, 7)), np.cumsum(lost, axis=0)])

@@ -376,8 +376,8 @@ def test_all_episodes_have_a_record():
     every = [ikgym.scenarios.get(name) for name in ikgym.scenarios.names()]
     fixed = {(one.name, 0) for one in every if not (one.random or one.collides)}
     assert fixed < {(scenario.name, draw.seed) for scenario, draw in todo}
-    own = {(one.scenario, one.seed) for one in best_known.read()}  # of which test_best_known looks some up
-    others = [(one, draw) for one, draw in todo if (one.name, draw.seed) not in own]
+    known = {(one.scenario, one.seed) for one in best_known.read()}  # of which test_best_known looks some up
+    others = [(one, draw) for one, draw in todo if (one.name, draw.seed) not in known]
     missing = [(one.name, draw.seed) for one, draw in others if not best_known.lookup(one, draw.seed, draw.arm_seed)]
     assert not missing, f"find them with: {best_known.UPDATE}"
 

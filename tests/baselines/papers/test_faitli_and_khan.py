@@ -36,8 +36,8 @@ def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible
     for claim in (khan.f_weights_orientation_down, khan.f_couples, khan.w_degrades_q7_and_q8):
         assert claim(runs).verdict == ("reproduced" if degraded else "contradicted")
     assert khan.w_keeps_precision(runs).holds == {
-        "beside the run without W": not degraded,
-        "beside the extent": not visible,
+        "against the run without W": not degraded,
+        "against the extent": not visible,
     }
 
 

@@ -46,15 +46,15 @@ class Browser:
 
 
 def test_pages_of_other_origins_are_refused(server):
-    port, own = server.get_port(), f"{HOST}:{server.get_port()}"
+    port, address = server.get_port(), f"{HOST}:{server.get_port()}"
 
-    for origin in (f"http://{own}", None):
-        with connect(f"ws://{own}", origin=origin):
+    for origin in (f"http://{address}", None):
+        with connect(f"ws://{address}", origin=origin):
             pass
-    for origin in ("http://example.org", f"http://{HOST}:{port + 1}", f"http://{own}.example.org", "null"):
-        with pytest.raises(InvalidStatus, match="403"), connect(f"ws://{own}", origin=origin):
+    for origin in ("http://example.org", f"http://{HOST}:{port + 1}", f"http://{address}.example.org", "null"):
+        with pytest.raises(InvalidStatus, match="403"), connect(f"ws://{address}", origin=origin):
             pass
-    assert urllib.request.urlopen(f"http://{own}/").status == 200
+    assert urllib.request.urlopen(f"http://{address}/").status == 200
 
 
 @pytest.fixture
@@ -74,10 +74,10 @@ def wait_for(viewer, condition):
 def test_a_browser_is_told_the_scene_and_its_controls_do_what_they_say(server, viewer):
     session, target = viewer.session, viewer.drawing.target
     with connect(f"ws://{HOST}:{server.get_port()}", max_size=None, max_queue=None) as connection:
-        browser, told = Browser(connection), b""
+        browser, received = Browser(connection), b""
         wait_for(viewer, server.get_clients)
-        while not all(name in told for name in (b"/policy_1", b"joint_6", b"panda-circle**, seed 0", b"Play")):
-            told += connection.recv(timeout=PATIENCE)
+        while not all(name in received for name in (b"/policy_1", b"joint_6", b"panda-circle**, seed 0", b"Play")):
+            received += connection.recv(timeout=PATIENCE)
         browser.set(viewer.play, True)
         wait_for(viewer, lambda: session.playing)
         browser.set(viewer.time, 0.012)

@@ -63,12 +63,12 @@ def test_the_table_has_the_numbers_of_the_results(folder):
     rows = read_rows(folder / "results.json")
     shown = summarise(rows)
     assert shown.label.tolist() == ["dls", "moore_penrose", "dls:damping=0.05", "follow_nominal"] * 2 + ["dls"]
-    own = [row for row in rows if (row.scenario, row.policy) == (NASTY, "moore_penrose")]
+    here = [row for row in rows if (row.scenario, row.policy) == (NASTY, "moore_penrose")]
     line = cells(shown.iloc[[1]])
-    assert float(line["total cost"][0]) == pytest.approx(math.prod(row.total_cost for row in own) ** (1 / EPISODES))
-    assert float(line["pos max [mm]"][0]) == max(1e3 * row.position_error_max for row in own)
-    assert line["at q̈ limit"][1] == str(sum(row.steps_at_acceleration_limit for row in own)) != "0"
-    assert float(line["p50 [µs]"][0]) == own[0].time_p50_us  # the only one that was timed
+    assert float(line["total cost"][0]) == pytest.approx(math.prod(row.total_cost for row in here) ** (1 / EPISODES))
+    assert float(line["pos max [mm]"][0]) == max(1e3 * row.position_error_max for row in here)
+    assert line["at q̈ limit"][1] == str(sum(row.steps_at_acceleration_limit for row in here)) != "0"
+    assert float(line["p50 [µs]"][0]) == here[0].time_p50_us  # the only one that was timed
     assert "cost ratio" not in line  # no best known cost
 
 

@@ -43,7 +43,7 @@ def observed(on, arm, zeros, q, target=None):
 
 
 def noisy(on, observation, rng, noise):
-    """The same with a pose that is measured with noise. Task `pose` alone."""
+    """An observation with a pose that is measured with noise. Task `pose` alone."""
     rotation, position = observation["pose"][:9].reshape(3, 3), observation["pose"][9:]
     vector = noise * rng.standard_normal(3)
     turn = rodrigues(vector / np.linalg.norm(vector), np.linalg.norm(vector))

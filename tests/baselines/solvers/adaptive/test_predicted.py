@@ -25,8 +25,8 @@ def driven(scenario, policy, seeds=(SEED,), **plant):
     on = scenario.replace(plant=ikgym.Plant(**plant))
     episodes = rollouts(on, policy, list(seeds))
     costs = np.array([(episode.tracking_cost + episode.velocity_cost).sum() for episode in episodes])
-    told = {name: np.array([e.diagnostics[name][-1] for e in episodes]) for name in episodes[0].diagnostics}
-    return costs, np.array([episode.q for episode in episodes]), told
+    found = {name: np.array([e.diagnostics[name][-1] for e in episodes]) for name in episodes[0].diagnostics}
+    return costs, np.array([episode.q for episode in episodes]), found
 
 
 def made(policy="dls", scenario=None, **parameters):
@@ -51,16 +51,16 @@ def test_unknown_drives_are_identified():
     """Row by row, each with other drives; within 3 % of the lag, or 0.1 ms."""
     scenario, seeds = gentle(), range(SEED, SEED + 6)
     drives = {"command_delay": (0, 12), "bandwidth": (10.0, 20.0)}
-    costs, together, told = driven(scenario, made(), seeds, **drives)
+    costs, together, found = driven(scenario, made(), seeds, **drives)
     drawn = [scenario.replace(plant=ikgym.Plant(**drives)).drawn_plant(seed) for seed in seeds]
     assert len({one.command_delay for one in drawn}) > 3
     delays = np.tile([[one.command_delay] for one in drawn], 7)
-    np.testing.assert_allclose(told["delay"], delays, atol=0.15)
+    np.testing.assert_allclose(found["delay"], delays, atol=0.15)
     constants = 1.0 / (2.0 * np.pi * np.tile([[one.bandwidth] for one in drawn], 7))
-    np.testing.assert_allclose(told["time_constant"], constants, rtol=0.03, atol=1e-4)
+    np.testing.assert_allclose(found["time_constant"], constants, rtol=0.03, atol=1e-4)
     ideal, _, _ = driven(scenario, baselines.make("dls", scenario), seeds)
     assert (costs < 2.0 * ideal).all()
-    # With other delays in use beside it, a row is shown another part of the reference, and yet is a single call.
+    # With other delays in other rows, a row is shown another part of the reference, and yet is a single call.
     for row in range(2):
         np.testing.assert_array_equal(together[row], driven(scenario, made(), [SEED + row], **drives)[1][0])
 
@@ -83,8 +83,8 @@ def test_a_wrong_guess_is_stable(ideal):
 
 def test_old_joint_coordinates_are_taken_for_what_they_are(ideal):
     """The delay is that of the commands, not that of the sensor."""
-    costs, _, told = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)
-    np.testing.assert_allclose(told["delay"], 4, atol=0.05)
+    costs, _, found = driven(gentle(), made(oldest=5), command_delay=4, bandwidth=12.0, q_delay=5)
+    np.testing.assert_allclose(found["delay"], 4, atol=0.05)
     assert costs < 1.5 * ideal
 
 

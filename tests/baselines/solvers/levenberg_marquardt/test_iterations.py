@@ -202,7 +202,7 @@ def test_rank_that_is_lost_amid_a_horizon_is_said():
 
 
 def test_running_away_is_not_converging():
-    """Undamped beside a stretched elbow, one step is turns long; the arm stays, and the memory is cleared."""
+    """Undamped near a stretched elbow, one step is turns long; the arm stays, and the memory is cleared."""
     q = np.array([0.0, 0.3, 1e-5])
     inwards = 0.99 * ikgym.arms.get("zhang3").forward(q)[1] + [0, 0, 0.05]
     numbers = {"rule": "threshold", "damping": 0.0, "threshold": 1e3, "carry": True}

@@ -16,7 +16,7 @@ from tests.comparison import identical
 
 
 def clear_scenario(obstacles=(), **changes):
-    """A circle of the Panda with hand, and something beside its elbow."""
+    """A circle of the Panda with hand, and something next to its elbow."""
     return circle("panda-hand", radius=0.08, obstacles=obstacles, collisions=True, **changes)
 
 

@@ -21,7 +21,7 @@ def test_feasible_paths_are_met(name, bar):
 
 
 #: Largest errors in [m] of Pink (pin-pink 4.4.0, solver daqp, its limits of position, velocity and acceleration, frame
-#: costs 1, posture cost 0.001 to home in 1 s, the better of lm_damping 0 and 1), by a program of its own.
+#: costs 1, posture cost 0.001 to home in 1 s, the better of lm_damping 0 and 1), by a separate program.
 PINK = {"panda-turn": 0.12496, "panda-edge": 0.03438, "panda-fast": 0.25735}
 PINK |= {"iiwa14-turn": 0.01217, "iiwa14-edge": 0.05098, "iiwa14-fast": 0.15736}
 PINK |= {"tiago-turn": 0.01469, "tiago-edge": 0.03874, "tiago-fast": 0.11897}

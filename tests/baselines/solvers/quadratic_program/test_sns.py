@@ -1,4 +1,4 @@
-"""Saturation in the null space against its source and a linear program; in motion beside `qp`."""
+"""Saturation in the null space against its source and a linear program; in motion against `qp`."""
 
 import numpy as np
 

@@ -50,9 +50,9 @@ def test_plans_are_ipopts_and_a_batch_is_its_rows(golden):
         np.testing.assert_allclose(velocity, (plan[0] - horizon.q) / DT, atol=1e-6)
         assert (abs(velocity - horizon.qdot) <= DT * problem.model.acceleration_limit + 1e-6).all()
     for row in (0, 3):
-        alone, own = policy.predict({name: array[row] for name, array in observation.items()})
+        alone, memory = policy.predict({name: array[row] for name, array in observation.items()})
         np.testing.assert_array_equal(alone, action[row])
-        np.testing.assert_array_equal(policy.plan(own)[0], policy.plan(state)[row])
+        np.testing.assert_array_equal(policy.plan(memory)[0], policy.plan(state)[row])
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def invert(policy, jacobian, shift):
 
 
 def move(policy, q, jacobian, shift):
-    """The same of `null_space`, at joint coordinates (B, n)."""
+    """Joint velocities of `null_space`, at joint coordinates (B, n)."""
     out, status = np.empty_like(q), np.empty(len(q), dtype=np.int64)
     aim = np.empty_like(q)
     objective_rows(policy.numbers(), policy.problem.dt, q, aim)

@@ -87,7 +87,7 @@ def test_coal_mujoco_and_a_urdf_measure_the_clearance_of_the_arm():
 
 @pytest.mark.parametrize("name", ["pink", "mink", "roboplan"])
 def test_a_wall_in_the_way_is_not_touched(name):
-    """It stands across the way of the tool, half of which is behind it."""
+    """It lies across the way of the tool, half of which is behind it."""
     free = circle("panda-hand", acceleration_limit=np.full(7, np.inf))  # mink knows none
     way = np.diff(free.nominal(0)[[0, -1], -3:], axis=0)[0]
     wall = HalfSpace("wall", free.nominal(0)[0, -3:], -way)

@@ -68,7 +68,7 @@ class Case:
         return out
 
     def differences(self, part, step=1e-6):
-        """The gradient of the numbers, each by what its own arm begins with."""
+        """The gradient of the numbers, each by the start of its arm."""
         out = np.zeros(self.start[part].shape)
         for column in range(out.shape[1]):
             for sign in (1.0, -1.0):
@@ -105,11 +105,11 @@ def test_limits_are_met():
     path = case.play(case.start)
     q, qdot = path.q[:2], path.qdot[:2]
     lower, upper, fastest, change = case.task.limits
-    stands = (q == lower) | (q == upper)
-    moving = ~stands[:, 1:]
+    stopped = (q == lower) | (q == upper)
+    moving = ~stopped[:, 1:]
     fast = moving & (np.abs(qdot[:, 1:]) == fastest)
     jerky = moving & np.isclose(np.abs(np.diff(qdot, axis=1)), change, rtol=1e-12)
-    assert stands.any()
+    assert stopped.any()
     assert fast.any()
     assert jerky.any()
     assert (moving & ~fast & ~jerky).any()

@@ -26,8 +26,8 @@ def random_blocks(knots, n, rng, convex=True):
     blocks.second[:] = 0.1 * (half[1] + half[1].swapaxes(1, 2))
     blocks.coupling[:] = rng.uniform(0.1, 3.0, (knots, n))
     for k in range(knots):
-        own = blocks.coupling[k] + (blocks.coupling[k + 1] if k + 1 < knots else 0.0)
-        blocks.diagonal[k] += np.diag(own + (2.0 if convex else -4.0))
+        here = blocks.coupling[k] + (blocks.coupling[k + 1] if k + 1 < knots else 0.0)
+        blocks.diagonal[k] += np.diag(here + (2.0 if convex else -4.0))
         blocks.diagonal[k][np.triu_indices(n, 1)] = np.nan  # of no use, and never read
         blocks.second[k][np.triu_indices(n, 1)] = np.nan
     return blocks
