@@ -17,6 +17,8 @@ from ikgym.validation import Bounds, FloatArray, as_given, per_joint, read_only
 
 #: Largest motion to the posture, as a share of the joint motion that the task asks for.
 SECONDARY_SHARE = 0.5
+#: Largest one of a slow joint, as a share of its velocity limit.
+SLOW_SHARE = 0.15
 #: Gains in [1/s] by default, where that motion is limited, and elsewhere.
 SOFT_GAIN, GAIN = 2.5, 1.0
 
@@ -32,7 +34,8 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         lm_damping: How much that grows with the error. At least 0.
         secondary_gain: K in [1/s] of the way to a posture, at least 0 and below 2/Δt; 0 for the smallest joint
             velocity. Where :attr:`soft`, that motion is at most half as large as the joint motion that reference and
-            error ask for, so that an arm at rest stays at rest. By default 2.5 there, else 1, and at most 1/Δt.
+            error ask for, so that an arm at rest stays at rest, and it takes at most 0.15 of the velocity limit of a
+            slow joint. By default 2.5 there, else 1, and at most 1/Δt.
         posture: q* in [rad] or [m]; one number, or one a joint. If left out, the model's home; where it has none, the
             middle of the limits, and joints without limits are left alone.
         braking_share: Share of the acceleration limits assumed for braking at the reference. At most 1; 0 corrects
@@ -41,8 +44,9 @@ class VelocityProgram(ResolvedRate, abc.ABC):
             much as that many metres of position error, where limits do not allow both to vanish. Above 0; it changes
             nothing in tasks without orientation. Skew and matrix coordinates count as rad.
         joint_weights: w, above 0: how costly the motion of a joint is; only ratios count. One number, or one a joint.
-            If left out, (v_max / v)^1.5 of the largest joint velocities v, so that slow joints do little of what others
-            can do; equal ones where the model has no velocity limits.
+            If left out, (v_max / v)^1.1 of the largest joint velocities v for slow joints, with v < v_max / 3, 1 for
+            others, so that slow joints do little of what others can do; equal ones where the model has no velocity
+            limits.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -59,6 +63,8 @@ class VelocityProgram(ResolvedRate, abc.ABC):
     braking: float = derived()
     #: Largest secondary motion of the joints relative to the primary one; inf for any.
     secondary_share: float = derived()
+    #: Largest secondary velocities of the joints in [rad/s] or [m/s]; inf for any. Shape (n,).
+    secondary_limit: FloatArray = derived()
     #: Weights of the joints. Shape (n,).
     weights: FloatArray = derived()
     #: Gains to the posture in [1/s], and the posture. Shape (2, n).
@@ -72,10 +78,12 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         if self.secondary_gain is not None:
             self.check_secondary_gain(self.secondary_gain)
         target, gains = self._posture()
+        slow = self.weights_of(None) > 1.0
         brakes = np.isfinite(self.problem.model.acceleration_limit).any()
         self._settle(
             braking=self.braking_share if brakes else 0.0,
             secondary_share=SECONDARY_SHARE if self.soft else math.inf,
+            secondary_limit=read_only(np.where(slow, SLOW_SHARE * self.problem.largest_qdot, math.inf)),
             weights=self.weights_of(self.joint_weights),
             pull=read_only(np.array([gains, target])),
         )

@@ -92,7 +92,7 @@ def feedback_share(factor, jacobian, error, part, changes):
 
 
 @inner
-def limit_secondary(factor, jacobian, motion, error, share, weight, weights, preferred):
+def limit_secondary(factor, jacobian, motion, error, share, largest, weight, weights, preferred):
     """Limits preferred joint velocities to those that leave the task alone, and to a share of the primary motion.
 
     So the secondary motion begins and ends with that of the reference, and its accelerations are a share of those that
@@ -104,6 +104,7 @@ def limit_secondary(factor, jacobian, motion, error, share, weight, weights, pre
         motion: Motion of the reference in one step. Shape (e,).
         error: The present error. Shape (e,).
         share: Largest secondary motion, as a share of the primary one.
+        largest: Largest secondary velocities of the joints in [rad/s] or [m/s]. Shape (n,).
         weight: See :func:`motion_weight`.
         weights: Those of the joints. Shape (n,).
         preferred: Preferred joint velocities, changed in place. Shape (n,).
@@ -119,6 +120,9 @@ def limit_secondary(factor, jacobian, motion, error, share, weight, weights, pre
         most += weights[j] * primary[j] ** 2
         size += weights[j] * secondary[j] ** 2
     shorter = share * math.sqrt(most / size) if size > share * share * most else 1.0
+    for j in range(n):
+        if shorter * abs(secondary[j]) > largest[j]:
+            shorter = largest[j] / abs(secondary[j])
     for j in range(n):
         preferred[j] = shorter * secondary[j]
 
@@ -237,7 +241,8 @@ def row_program(model, numbers, q, last, change, jacobian, motion, error, prefer
             factor, jacobian, error, calm_gain(model.limits, 1.0) * numbers.braking, model.limits[CHANGE]
         )
     if definite and numbers.secondary_share < math.inf:
-        limit_secondary(factor, jacobian, motion, error, numbers.secondary_share, weight, weights, preferred)
+        share_of_motion, largest = numbers.secondary_share, numbers.secondary_limit
+        limit_secondary(factor, jacobian, motion, error, share_of_motion, largest, weight, weights, preferred)
     for a in range(error.shape[0]):
         error[a] *= share
         motion[a] += error[a]

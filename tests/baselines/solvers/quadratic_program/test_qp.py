@@ -39,11 +39,16 @@ def states(scenario, rows, far, seed=0):
 
 
 def secondary(policy, q, hessian, weight, primary):
-    """The motion z to the posture: without what moves the task, at most half as large as the primary one, in W."""
+    """The motion z to the posture: without what moves the task, at most half as large as the primary one, in W.
+
+    Joints with less than a third of the largest velocity have at most 0.15 of theirs.
+    """
     (gain, posture), joints = policy.numbers().pull, policy.numbers().weights
     z = np.linalg.solve(hessian, weight * joints * gain * (posture - q))
     larger = np.sqrt((joints * z**2).sum() / (joints * primary**2).sum()) / 0.5
-    return z / max(larger, 1.0)
+    fastest = policy.problem.largest_qdot
+    slow = np.where(3.0 * fastest < fastest.max(), np.abs(z) / (0.15 * fastest), 0.0)
+    return z / max(larger, slow.max(), 1.0)
 
 
 def program(policy, batch, memory, i, scale=1.0):
@@ -97,7 +102,7 @@ def test_is_the_minimum_that_it_states(on, far, rotation_weight):
         assert ((lower <= ours) & (ours <= upper)).all()
         bound += ((ours == lower) | (ours == upper)).any()
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
-    assert (solution.iterations == 1).all() if unlimited else bound > 8
+    assert (solution.iterations == 1).all() if unlimited else bound > 4
 
 
 @pytest.mark.parametrize("on", ["tiago", "no limits"])

@@ -7,6 +7,7 @@ import ikgym
 from tests.baselines.controller.circles import circle
 from tests.baselines.solvers.quadratic_program.paths import played
 
+PATHS = ("circle", "lemniscate", "square", "raster", "glue")
 CATALOGUE = ("panda-circle", "panda-lemniscate", "iiwa14-circle", "iiwa14-lemniscate", "tiago-circle")
 
 
@@ -50,13 +51,15 @@ def test_circles_in_a_row_end_where_they_begin(name):
 
 
 @pytest.mark.parametrize(
-    "name", [marked(name) for name in ("tiago-circle", "tiago-square", "tiago-raster", "tiago-glue")]
+    "name", ["tiago-line", *(pytest.param(f"tiago-{name}", marks=pytest.mark.slow) for name in PATHS)]
 )
 def test_a_slow_torso_is_spared(name):
-    """With equal weights it is at its limit on these paths."""
+    """With equal weights it comes near to its limit or to it on these paths."""
     scenario = scenario_of(name)
-    torso = np.abs(played(scenario).qdot[:, 0]).max() / scenario.velocity_limit[0]
+    episode = played(scenario)
+    torso = np.abs(episode.qdot[:, 0]).max() / scenario.velocity_limit[0]
     assert torso < 0.7
+    assert episode.position_error.max() < 2e-6
     assert np.abs(played(scenario, joint_weights=1.0).qdot[:, 0]).max() / scenario.velocity_limit[0] > torso
 
 
