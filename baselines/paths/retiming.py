@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.controller.guards import Guards
 from baselines.paths.motion import OTHERS, PREFERRED, Motion, with_slow_joints_spared
 from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, followed, survey
 from baselines.paths.timing import Timing
@@ -52,12 +53,15 @@ class Retimed:
 
     @property
     def share(self) -> float:
-        """The largest share of a limit of velocity or acceleration that the motion takes, from rest on."""
+        """The largest share of a limit of velocity or acceleration that the motion takes, from rest on.
+
+        Where the arm states no acceleration, that of the control loop is the limit, see :class:`Guards`.
+        """
         q, dt, scenario = self.motion.q[:, 0], self.motion.times[1], self.scenario
         qdot = np.diff(q, axis=0, prepend=q[:1]) / dt
         shares = (
             np.abs(qdot) / scenario.largest_qdot,
-            np.abs(np.diff(qdot, axis=0)) / dt / scenario.arm.acceleration_limit,
+            np.abs(np.diff(qdot, axis=0)) / dt / Guards().acceleration(scenario.arm),
         )
         return float(max(share.max() for share in shares))
 

@@ -33,6 +33,8 @@ SHOWN, CLEARANCE = 8, 5
 #: With a lag of 20 ms and 2 periods of 4 ms, the control loop follows 29 of 29 retimed paths, with 40 ms and 3 periods
 #: 20; without a reserve, with 20 ms and 2 periods, none of seven.
 RESERVE = 0.15
+#: A motion that uses more than this share of a limit is played on drives that lag, also where it is not retimed.
+HARD = 0.7
 
 
 @dataclasses.dataclass(frozen=True)
@@ -230,7 +232,7 @@ def _warnings(found: Survey, driven: Retimed) -> list[str]:
     if excess[joint] > 1.0:
         allowed = f"{Guards().acceleration(arm)[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
         lines.append(f"Controller allows {allowed}, and may lose the path: state limits with --acceleration.")
-    if driven.duration != found.duration:
+    if driven.duration != found.duration or driven.share > HARD:
         loop = play_late(driven.scenario, driven.solver)
         ends = f"follows within {_small(loop.error, 'm')}."
         if loop.stopped is not None:

@@ -17,7 +17,9 @@ import ikgym
 from baselines.cli import main
 from baselines.cli.commands import path
 from baselines.cli.parsing import EpisodeOptions
+from baselines.controller import StopReason
 from baselines.paths import retiming
+from baselines.paths.late import Loop
 from baselines.paths.starts import starts
 from tests.robots import FOLDER, ROBOTS
 
@@ -70,6 +72,21 @@ def test_accelerations_that_the_control_loop_does_not_allow_are_named(capsys):
     assert "those of Controller are kept" in text
     assert "Controller allows" not in text
     assert re.search(r"2 periods of delay, Controller follows within [\d.]+ mm", text)
+
+
+def test_a_motion_near_its_limits_is_played_on_drives_that_lag(monkeypatch, capsys):
+    """Also where it is driven as asked; the verdict says what stops it."""
+    assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
+    assert "2 periods of delay" not in capsys.readouterr().out
+    monkeypatch.setattr(path, "HARD", 0.0)
+    assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "It can be driven as it is" in text
+    assert re.search(r"a lag of 20 ms and 2 periods of delay, Controller follows within [\d.]+ mm\.", text)
+    monkeypatch.setattr(path, "play_late", lambda *_: Loop(0.03, StopReason.PATH_ERROR, 0.28))
+    assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "Controller stops after 0.28 s (PATH_ERROR): begin with a slower motion, or keep more in reserve" in text
 
 
 def test_a_path_that_is_too_fast_from_a_branch_of_ones_own_choice(capsys, monkeypatch):
