@@ -14,7 +14,7 @@ import numpy as np
 
 import ikgym
 from baselines import Controller, Drives
-from baselines.evaluation.compare.library_times import library_times
+from baselines.evaluation.compare.playing import library_times
 from baselines.solvers.rivals.base import Rival
 from docs.keeping import Line
 

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 
 import ikgym
-from ikgym.rendering import Renderer, picture, renderer, style
+from ikgym.rendering import Renderer, picture, renderer, scene
 from ikgym.rendering.renderer import HEIGHT, WIDTH
 from tests.bodied import crowd
 
@@ -166,7 +166,7 @@ def test_long_curves_are_thinned_and_keep_their_peaks():
         drawn.add(k, np.full(3, 1e-4 * k), 5.0 if k == 1234 else 1e-3, np.nan)
     drawn.draw()
     (line,) = drawn.figure.findobj(lambda a: a.get_gid() == "position error")
-    assert len(line.get_xdata()) <= style.MOST_POINTS + 1
+    assert len(line.get_xdata()) <= scene.MOST_POINTS + 1
     assert line.get_ydata().max() == 5.0
     assert line.get_xdata()[-1] == pytest.approx(0.001 * (states - 1))
 

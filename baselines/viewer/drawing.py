@@ -19,8 +19,7 @@ from baselines.viewer.session import Mode, PolicyView, Session
 from ikgym.arms import Arm
 from ikgym.kernels.rotations import quaternion
 from ikgym.obstacles.solids import bounded, on_links, surface
-from ikgym.rendering.scene import Scene
-from ikgym.rendering.style import GREEN, PALE_GREEN, stride, thin
+from ikgym.rendering.scene import GREEN, PALE_GREEN, Scene, stride, thin
 from ikgym.validation import FloatArray
 
 # Radii and half a length of cylinders, and half the edge of the plate that a half-space is drawn as.

@@ -17,8 +17,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from ikgym.obstacles.solids import bounded, in_space, outline
-from ikgym.rendering.scene import Scene
-from ikgym.rendering.style import (
+from ikgym.rendering.scene import (
     BLUE,
     GREEN,
     INK,
@@ -32,6 +31,7 @@ from ikgym.rendering.style import (
     SMALL,
     STEEL,
     VERMILION,
+    Scene,
     stride,
     thin,
 )

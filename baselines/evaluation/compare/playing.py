@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import textwrap
+import time
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+import ikgym
 from baselines import registry
 from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
-from baselines.evaluation.compare.library_times import with_library_times
 from baselines.evaluation.compare.rule import PREFERRED, RULE, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
@@ -20,13 +21,17 @@ from baselines.evaluation.summary import ERRORS, TIMES, summarise
 from baselines.evaluation.table import Column, plain
 from baselines.paths import retime
 from baselines.paths.late import DELAY, LAG, late
+from baselines.solvers.rivals.base import Rival
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
+from ikgym.validation import FloatArray
 
 #: Names of the paths in tables.
 AS_IT_IS, RETIMED, LATE = "as it is", "retimed", "late drives"
 #: Remark on the times of solvers of other projects.
 LIBRARY = "p50, p99 of pink and mink: calls of the library alone; with late drives all calls of the controller"
+#: Steps in which such a library is timed alone, without the checks and conversions of its policy.
+STEPS = 500
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -111,3 +116,30 @@ def _retime(scenario: Scenario, notes: list[str]) -> list[Scenario]:
 
 def _by_solver(rows: Iterable[Row], path: str) -> Rows:
     return {solver_of(row): row for row in rows if row.scenario == path}
+
+
+def with_library_times(row: Row, scenario: Scenario) -> Row:
+    """The row with the median and the 99th percentile of the library's calls; other rows as they are."""
+    policy = registry.make(row.policy, scenario, **row.parameters)
+    if not isinstance(policy, Rival):
+        return row
+    spent = 1e6 * library_times(policy, scenario, STEPS)
+    return dataclasses.replace(
+        row, **dict(zip(("time_p50_us", "time_p99_us"), np.percentile(spent, (50, 99)), strict=True))
+    )
+
+
+def library_times(policy: Rival, scenario: Scenario, steps: int) -> FloatArray:
+    """Durations in [s] of the library's calls in the first steps of an episode. Shape (k,)."""
+    env = ikgym.RedundantIKEnv(scenario, preview=1)
+    (observation, _), call = env.reset(seed=0), policy.make_step()
+    start, spent = observation["q"].copy(), np.empty(min(steps, scenario.steps))
+    for k in range(len(spent)):
+        q, qdot, pose, nominal = (observation[key] for key in ("q", "qdot", "pose", "nominal"))
+        seen = policy.target(q, qdot, start, pose, nominal[0])
+        begin = time.perf_counter()
+        found = call(seen)
+        spent[k] = time.perf_counter() - begin
+        wanted = np.zeros(len(q)) if found is None else found / scenario.velocity_limit
+        observation, *_ = env.step(np.clip(wanted, -1.0, 1.0).astype(np.float32))
+    return spent

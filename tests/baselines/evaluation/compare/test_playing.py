@@ -6,7 +6,7 @@ import pytest
 
 import ikgym
 from baselines.evaluation import report
-from baselines.evaluation.compare import library_times, playing, rule
+from baselines.evaluation.compare import playing, rule
 from baselines.evaluation.compare.playing import compare
 from baselines.solvers.rivals.base import Rival
 
@@ -45,7 +45,7 @@ def test_times_of_a_library_are_those_of_its_own_calls(monkeypatch):
     """A conversion that takes 20 ms does not count."""
     pytest.importorskip("mink")
     monkeypatch.setattr(playing, "PREFERRED", ("dls", "mink"))
-    monkeypatch.setattr(library_times, "STEPS", 5)
+    monkeypatch.setattr(playing, "STEPS", 5)
     target = Rival.target
 
     def slow(policy, *observed):
