@@ -62,6 +62,12 @@ def pinocchio_pose(xml, base, tip, coordinates):
     return data.oMf[model.getFrameId(base)].actInv(data.oMf[model.getFrameId(tip)])
 
 
+def assert_same(pose, expected):
+    """That an arm has its tip where Pinocchio has it."""
+    np.testing.assert_allclose(pose[0], expected.rotation, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pose[1], expected.translation, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("base", "tip", "moving"),
     [
@@ -77,10 +83,7 @@ def test_forward_kinematics_is_that_of_pinocchio(write, base, tip, moving):
     arm = from_urdf(path, base=base, tip=tip)
     assert arm.joints == len(moving)
     for q in (np.zeros(arm.joints), *np.random.default_rng(0).uniform(-3, 3, (20, arm.joints))):
-        rotation, position = arm.forward(q)
-        expected = pinocchio_pose(WHOLE, base, tip, dict(zip(moving, q, strict=True)))
-        np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
+        assert_same(arm.forward(q), pinocchio_pose(WHOLE, base, tip, dict(zip(moving, q, strict=True))))
 
 
 def test_vendor_tags_of_an_undeclared_prefix_are_passed_over_as_pinocchio_does(write):
@@ -88,8 +91,7 @@ def test_vendor_tags_of_an_undeclared_prefix_are_passed_over_as_pinocchio_does(w
     xml = robot(joint("j1", "a", "b", inside=inside), links="ab", extra='<vendor:link name="no"/>')
     xml = xml.replace("<robot ", '<robot vendor:model="7" ')
     arm = from_urdf(write(xml))
-    expected = pinocchio_pose(xml, "a", "b", {"j1": 0.3})
-    np.testing.assert_allclose(arm.forward([0.3])[0], expected.rotation, rtol=0, atol=1e-12)
+    assert_same(arm.forward([0.3]), pinocchio_pose(xml, "a", "b", {"j1": 0.3}))
     assert (arm.joint_names, arm.lower[0]) == (("j1",), -1.5)
 
 
@@ -341,11 +343,8 @@ def test_a_tool_offset_is_a_fixed_joint_at_the_tip(write, rotated):
     with_tool = WHOLE.replace("</robot>", f"{end}</robot>")
     arm = from_urdf(write(WHOLE), tip="tool", tool=[0.1, -0.2, 0.35], tool_rotation=TURN if rotated else None)
     for q in np.random.default_rng(1).uniform(-3, 3, (20, 4)):
-        rotation, position = arm.forward(q)
         coordinates = dict(zip(["turn", "spin", "slide", "roll"], q, strict=True))
-        expected = pinocchio_pose(with_tool, "world", "end", coordinates)
-        np.testing.assert_allclose(rotation, expected.rotation, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(position, expected.translation, rtol=0, atol=1e-12)
+        assert_same(arm.forward(q), pinocchio_pose(with_tool, "world", "end", coordinates))
 
 
 def test_an_arm_remembers_its_file_until_it_is_changed(write, monkeypatch):
