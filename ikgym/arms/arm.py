@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.arms import checks
 from ikgym.arms.bodies import Bodies, Neighbour
 from ikgym.arms.source import UrdfReference
 from ikgym.exceptions import InvalidInputError
@@ -20,18 +19,23 @@ from ikgym.kernels.bodies import clearance_rows
 from ikgym.kernels.kinematics import Chain
 from ikgym.validation import (
     LARGEST,
+    UNIT_TOLERANCE,
     FloatArray,
     Rotation,
     Vector,
     about,
+    different_texts,
     ending,
     float_array,
     frozen_array,
+    read_only,
     shortened,
 )
 
 #: Fields that say nothing of the geometry.
 FACTS = frozenset(("name", "lower", "upper", "velocity_limit", "acceleration_limit", "jerk_limit", "home"))
+# Within this of length 1, a vector is a rounded unit vector: three floats cannot come closer in general.
+ROUNDING = 4e-16
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,7 +75,7 @@ class Arm(Frozen):
 
     name: str
     offsets: Annotated[FloatArray, functools.partial(frozen_array, shape=(None, 3), at_most=LARGEST)]
-    axes: Annotated[FloatArray, checks.unit_axes]
+    axes: Annotated[FloatArray, _unit_axes]
     prismatic: Sequence[bool] = ()
     tool: Vector = dataclasses.field(default_factory=lambda: np.zeros(3))
     tool_rotation: Rotation = dataclasses.field(default_factory=lambda: np.eye(3))
@@ -102,12 +106,10 @@ class Arm(Frozen):
         ends = {"lower": -np.inf, "upper": np.inf}
         fastest = {"velocity_limit": np.inf, "acceleration_limit": np.inf, "jerk_limit": np.inf}
         self._settle(
-            prismatic=checks.truth_values("prismatic", self.prismatic, n),
-            joint_names=checks.joint_names("joint_names", self.joint_names, n),
-            **{name: checks.limits(name, getattr(self, name), n, free) for name, free in ends.items()},
-            **{
-                name: checks.limits(name, getattr(self, name), n, free, positive=True) for name, free in fastest.items()
-            },
+            prismatic=_truth_values("prismatic", self.prismatic, n),
+            joint_names=_joint_names("joint_names", self.joint_names, n),
+            **{name: joint_limits(name, getattr(self, name), n, free) for name, free in ends.items()},
+            **{name: joint_limits(name, getattr(self, name), n, free, positive=True) for name, free in fastest.items()},
         )
         self.bodies.check(n)
         if (crossed := self.lower >= self.upper).any():
@@ -311,3 +313,55 @@ class Arm(Frozen):
     def _rows(self, q: npt.ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
         array = ending("q", q, self.joints)
         return array.reshape(-1, self.joints), array.shape[:-1]
+
+
+def _unit_axes(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Axes of exactly unit length, read-only. Shape (n, 3)."""
+    axes = float_array(name, value, (None, 3), at_most=LARGEST)
+    lengths: FloatArray = np.linalg.norm(axes, axis=1)
+    for i, length in enumerate(lengths):
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            got = "the zero vector" if length == 0.0 else f"{axes[i].tolist()} of length {length:.6g}"
+            raise InvalidInputError(
+                f"{name}: expected a unit vector for joint {i}, got {got}. Axes are not normalised silently, because a "
+                "wrong length is usually a mistake; divide by the length if it is meant."
+            )
+    # A rounded unit vector divided by its length again may change in the last bit, and a copy must equal the arm.
+    exact = np.abs(lengths - 1.0) <= ROUNDING
+    return read_only(np.where(exact[:, None], axes, axes / lengths[:, None]))
+
+
+def _truth_values(name: str, prismatic: Any, n: int) -> tuple[bool, ...]:
+    """Which joints are prismatic, one entry a joint."""
+    values = (tuple(prismatic) or (False,) * n) if isinstance(prismatic, Iterable) else ()
+    if len(values) != n or not all(isinstance(value, (bool, np.bool_)) for value in values):
+        raise InvalidInputError(f"{name}: expected {n} truth values, one a joint, got {shortened(prismatic)}.")
+    return tuple(bool(value) for value in values)
+
+
+def numbered_joints(n: int) -> tuple[str, ...]:
+    """The default names of joints."""
+    return tuple(f"joint_{i + 1}" for i in range(n))
+
+
+def _joint_names(name: str, given: Any, n: int) -> tuple[str, ...]:
+    """Names of the joints; none are given by an empty list."""
+    return numbered_joints(n) if isinstance(given, (tuple, list)) and not given else different_texts(name, given, n)
+
+
+def joint_limits(
+    name: str, value: npt.ArrayLike | None, n: int, default: float = np.inf, *, positive: bool = False
+) -> FloatArray:
+    """Limits of the joints, which may be infinite, read-only. Shape (n,)."""
+    if value is None:
+        return read_only(np.full(n, default))
+    try:
+        raw = np.asarray(value)
+        # NumPy would read strings as numbers.
+        if raw.dtype.kind not in "fiu" or raw.shape != (n,) or np.isnan(raw).any():
+            raise ValueError
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name}: expected {n} numbers, got {shortened(value)}.") from None
+    if positive and (raw <= 0.0).any():
+        raise InvalidInputError(f"{name}: expected numbers above 0, got {raw.tolist()}.")
+    return read_only(raw.astype(np.float64))

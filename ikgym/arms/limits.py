@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.arms.arm import Arm
-from ikgym.arms.checks import limits
+from ikgym.arms.arm import Arm, joint_limits
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import LARGEST, SMALLEST, FloatArray, per_joint
 
@@ -35,7 +34,9 @@ def velocity_scale(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
 def jerk_limits(arm: Arm, given: npt.ArrayLike | None) -> FloatArray:
     """The limits of jerk in [rad/s³] or [m/s³], inf for none: those given, else the arm's. Shape (n,)."""
     limit = arm.jerk_limit if given is None else given
-    return limits("jerk_limit", np.full(arm.joints, limit) if np.ndim(limit) == 0 else limit, arm.joints, positive=True)
+    return joint_limits(
+        "jerk_limit", np.full(arm.joints, limit) if np.ndim(limit) == 0 else limit, arm.joints, positive=True
+    )
 
 
 def farthest(arm: Arm) -> FloatArray:

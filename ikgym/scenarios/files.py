@@ -17,9 +17,8 @@ import numpy as np
 
 from ikgym import arms, files, tasks
 from ikgym.arms import Arm
-from ikgym.arms.arm import FACTS
+from ikgym.arms.arm import FACTS, numbered_joints
 from ikgym.arms.bodies import Bodies
-from ikgym.arms.checks import numbered_joints
 from ikgym.cost import ProximityCost, TrackingCost
 from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
 from ikgym.obstacles import KINDS as OBSTACLES
