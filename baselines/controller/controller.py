@@ -34,6 +34,7 @@ logger = logging.getLogger("ikgym")
 
 #: Steps left where no end of the episode is given.
 ENDLESS = 1_000_000
+_NONE: FloatArray = np.empty(0)
 _DIVERGED = int(Status.DIVERGED)
 #: Calls that :meth:`Controller.warm_up` times, and the largest number of them.
 WARM_UP, MOST_CALLS = 500, 10_000_000
@@ -98,7 +99,8 @@ class Controller:
         self._limits = problem.limits
         # The largest changes of a command that limits allow: larger ones are those of an arm that has stopped itself.
         steps = problem.limits[JERK]
-        self._quickest = np.minimum(problem.limits[CHANGE], steps + np.sqrt(2.0 * problem.limits[FASTEST] * steps))
+        quickest = np.minimum(problem.limits[CHANGE], steps + np.sqrt(2.0 * problem.limits[FASTEST] * steps))
+        self._takes = problem.dt, problem.largest_qdot, quickest
         self._unit, self._change = np.array(problem.velocity_limit), self._guards.deceleration(problem)
         delay = LONGEST if self._given is None else math.ceil(np.max(self._given.delay))
         self._bounds, self._numbers = self._guards.bounds(problem), self._guards.numbers(delay)
@@ -161,19 +163,16 @@ class Controller:
                 velocities are missing.
         """
         measured = numbers("q", q, (self._joints,))
-        taken = None if commanded is None else self._speed("commanded", commanded)
-        change = None if commanded_acceleration is None else self._reported_change(commanded_acceleration, taken)
-        speed = (self._last.copy() if taken is None else taken) if qdot is None else self._speed("qdot", qdot)
+        report = self._report(commanded, commanded_acceleration)
+        speed = None if qdot is None else self._speed(qdot)
         seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
         nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
         ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)
-        if taken is not None:
-            made = self._moved + taken - self._last if change is None else change
-            if np.isfinite(taken + made).all():
-                self._moved = np.clip(made, -self._quickest, self._quickest)
-                self._last[:] = taken
-            else:
-                speed = taken + made  # which the guards refuse
+        taken = report is None or kernels.take_report(*report, *self._takes, self._last, self._moved)
+        if not taken:
+            speed = np.full(self._joints, np.nan)  # which the guards refuse
+        elif speed is None:
+            speed = self._last.copy()
         if self._stopped is None:
             reason = kernels.watch(
                 *(measured, speed, seen, ahead, *ages),
@@ -182,8 +181,10 @@ class Controller:
             if solids is not None and not np.isfinite(solids).all():
                 reason = kernels.NOT_FINITE
             if self._made == 0 and reason != kernels.NOT_FINITE:
-                self._last[:] = speed if taken is None else taken  # an arm in motion is taken over
-                self._moved[:] = 0.0 if change is None else self._moved
+                if report is None:
+                    self._last[:] = speed  # an arm in motion is taken over
+                if commanded_acceleration is None:
+                    self._moved[:] = 0.0
             if reason == 0:
                 return self._commanded(measured, speed, seen, nominal, ages, solids)
             self._stopped = StopReason(reason)
@@ -234,17 +235,23 @@ class Controller:
             raise InvalidInputError("report: expected a step to be made first.")
         return self.policy.report(self._state)
 
-    def _speed(self, name: str, qdot: npt.ArrayLike) -> FloatArray:
-        """Reported joint velocities, cut to the largest ones. Shape (n,)."""
-        fastest = self._problem.largest_qdot
-        speed: FloatArray = np.clip(numbers(name, qdot, (self._joints,)), -fastest, fastest)
+    def _speed(self, qdot: npt.ArrayLike) -> FloatArray:
+        """Measured joint velocities, cut to the largest ones. Shape (n,)."""
+        fastest = self._takes[1]
+        speed: FloatArray = np.clip(numbers("qdot", qdot, (self._joints,)), -fastest, fastest)
         return speed
 
-    def _reported_change(self, acceleration: npt.ArrayLike, taken: FloatArray | None) -> FloatArray:
-        """The change of the commanded velocities in a period, from their acceleration. Shape (n,)."""
-        if taken is None:
-            raise InvalidInputError("commanded_acceleration: expected commanded velocities as well, got none.")
-        return self._problem.dt * numbers("commanded_acceleration", acceleration, (self._joints,))
+    def _report(
+        self, velocity: npt.ArrayLike | None, acceleration: npt.ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """The command that the arm reports; its acceleration is empty where that is not reported. Shapes (n,)."""
+        if velocity is None:
+            if acceleration is not None:
+                raise InvalidInputError("commanded_acceleration: expected commanded velocities as well, got none.")
+            return None
+        shape = (self._joints,)
+        reported = _NONE if acceleration is None else numbers("commanded_acceleration", acceleration, shape)
+        return numbers("commanded", velocity, shape), reported
 
     def _obstacles(self, obstacles: npt.ArrayLike | Sequence[Obstacle] | None) -> FloatArray | None:
         """Rows of the obstacles, where the policy is shown any. Shape (o, 16)."""
@@ -352,6 +359,7 @@ class Controller:
         """Compiles kernels that the first periods may not call: poses as rotation and position, and a stop."""
         self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
         self._braked()
+        kernels.take_report(np.zeros(self._joints), _NONE, *self._takes, self._last, self._moved)
 
 
 def _age(name: str, age: float) -> float:

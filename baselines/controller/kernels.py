@@ -86,6 +86,28 @@ def errors(kind, nominal, pose):
 
 
 @kernel
+def take_report(velocity, acceleration, dt, fastest, quickest, last, change):
+    """Takes over the command that an arm reports, unless a number is not finite; whether it does.
+
+    Args:
+        velocity: Joint velocities in [rad/s] or [m/s]. Shape (n,).
+        acceleration: In [rad/s²] or [m/s²], of shape (n,); empty where the arm reports none.
+        dt: Δt in [s].
+        fastest: The largest velocities, to which they are cut. Shape (n,).
+        quickest: The largest changes of a velocity in a period. Shape (n,).
+        last: See :func:`command`, changed in place. Shape (n,).
+        change: See :func:`command`, changed in place. Shape (n,).
+    """
+    if np.isnan(velocity).any() or not np.isfinite(acceleration).all():
+        return False
+    for j in range(last.shape[0]):
+        taken = min(max(velocity[j], -fastest[j]), fastest[j])
+        made = dt * acceleration[j] if acceleration.shape[0] > 0 else change[j] + taken - last[j]
+        change[j], last[j] = min(max(made, -quickest[j]), quickest[j]), taken
+    return True
+
+
+@kernel
 def command(limits, q, action, unit, last, change, dt, kept, out):
     """The joint velocities that limits make of an action.
 

@@ -11,6 +11,7 @@ import numpy as np
 from baselines.policy_kernels import JERK, Model, model_block, model_of
 from ikgym.arms import Arm
 from ikgym.cost import TrackingCost
+from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.kernels.bodies import Shapes, Surroundings
 from ikgym.kernels.tasks import pose_rows
@@ -21,6 +22,8 @@ from ikgym.validation import LARGEST, BoolArray, FloatArray, frozen_array, read_
 
 # Actions in float32 miss a velocity by up to this share of the one that an action of 1 means.
 ROUNDING = 2.0**-24
+#: Most periods in which an acceleration builds up with the least limit of jerk.
+LONGEST_RISE = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,6 +53,21 @@ class Problem(Frozen):
 
     def __post_init__(self) -> None:
         self._settle(velocity_limit=frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,)))
+        if self.jerk_limit is not None:
+            self._check_jerk(self.jerk_limit)
+
+    def _check_jerk(self, jerk_limit: FloatArray) -> None:
+        """Refuses limits of jerk with which accelerations take too many steps to build up."""
+        change = self.dt * self.model.acceleration_limit
+        least = np.minimum(change / LONGEST_RISE, 2.0 * self.largest_qdot / LONGEST_RISE**2) / self.dt**2
+        if (low := jerk_limit < least).any():
+            j = int(np.argmax(low))
+            unit = "m" if self.model.prismatic[j] else "rad"
+            raise InvalidInputError(
+                f"jerk_limit: expected at least {least[j]:.3g} {unit}/s³ for joint {self.model.joint_names[j]!r}, so "
+                f"that its acceleration builds up within {LONGEST_RISE} periods of {1e3 * self.dt:g} ms, since stops "
+                f"are computed period by period; got {jerk_limit[j]:.3g}."
+            )
 
     @property
     def largest_qdot(self) -> FloatArray:

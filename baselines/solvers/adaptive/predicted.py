@@ -125,6 +125,11 @@ class Predicted(NamedWrapper):
         """See :func:`start_memory`."""
         return start_memory(rows, self.problem.task.size, self._hypotheses, self.oldest)
 
+    def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
+        """See :meth:`SolverPolicy.recall`; the base policy moves the model, whatever was sent."""
+        del qdot, change
+        return memory
+
     def solve(self, batch: Batch, memory: Memory) -> Solution:
         """See :meth:`SolverPolicy.solve`."""
         outer, inside = self.split(memory)

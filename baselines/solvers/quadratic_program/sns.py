@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from baselines.policy.compiled import derived
+from baselines.policy_kernels import JERK
 from baselines.solvers.quadratic_program.program import curvature, feedback_share, motion_weight
 from baselines.solvers.quadratic_program.velocity_box import calm_gain, smooth_box
 from baselines.solvers.resolved_rate.base import APPLIED, ResolvedRate, task_motion
@@ -25,8 +27,11 @@ ROUNDING = 1e-12
 
 
 @inner
-def saturate(jacobian, shift, damping, lower, upper, qdot):
+def saturate(jacobian, shift, damping, lower, upper, smooth, qdot):
     """The algorithm for one arm: J (e, n), the task velocity (e,), bounds (n,); ``qdot`` (n,) receives the velocities.
+
+    With a limited jerk (``smooth``), bounds are narrow and often leave out 0. Where they leave no share of the task
+    velocity, the joint velocities for all of it are cut to them: those for none of it would brake, and lose the task.
 
     Returns:
         The number of decompositions, and whether the task velocity was scaled down.
@@ -55,8 +60,9 @@ def saturate(jacobian, shift, damping, lower, upper, qdot):
         scale, critical = scaling(along, base, lower, upper)
         if scale > best:
             best = scale
+            share = 1.0 if smooth and scale == 0.0 else scale
             for j in range(n):
-                qdot[j] = min(max(scale * along[j] + base[j], lower[j]), upper[j])
+                qdot[j] = min(max(share * along[j] + base[j], lower[j]), upper[j])
         if critical == NONE:
             break
         free[critical] = False
@@ -94,7 +100,7 @@ def sns_step(model, numbers, batch, solution):
     jacobian, shift, error = task_motion(model, batch, solution.memory)
     error *= calm_gain(model.limits, numbers.gain)
     (q, last), (qdot, _, status, iterations), limits, dt = (batch.q, batch.qdot), solution, model.limits, model.dt
-    reach, n = numbers.reach, q.shape[1]
+    reach, n, smooth = numbers.reach, q.shape[1], np.min(limits[JERK]) < math.inf
     lower, upper, equal, hessian = np.empty(n), np.empty(n), np.ones(n), np.empty((n, n))
     for row in range(q.shape[0]):
         smooth_box(limits, dt, q[row], last[row], batch.change[row], lower, upper)
@@ -109,7 +115,7 @@ def sns_step(model, numbers, batch, solution):
                 part = calm_gain(limits, 1.0) * numbers.braking
                 error[row] *= feedback_share(hessian, jac, error[row], part, limits[CHANGE] / reach)
         shift[row] += error[row]
-        iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, qdot[row])
+        iterations[row], scaled = saturate(jac, shift[row], numbers.damping, lower, upper, smooth, qdot[row])
         qdot[row] *= reach
         status[row] = SATURATED if scaled else APPLIED
 

@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
+import baselines
 import ikgym
 from baselines.policy import Problem
-from baselines.solvers.quadratic_program.velocity_box import smooth_box, stopping_change, stopping_way, velocity_box
+from baselines.solvers.quadratic_program.velocity_box import (
+    longest_way,
+    smooth_box,
+    stopping_change,
+    stopping_way,
+    velocity_box,
+)
+from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 
 DT = 0.01
@@ -68,6 +76,16 @@ def test_the_way_of_a_stop_is_that_of_its_steps(step):
         assert stopping_way(velocity, change, CHANGE, step) == pytest.approx(farthest, rel=1e-9, abs=1e-12)
 
 
+def test_the_longest_way_is_a_bound():
+    rng = np.random.default_rng(3)
+    for _ in range(20_000):
+        step = 10.0 ** rng.uniform(-6, 0)
+        change = np.inf if rng.random() < 0.3 else step * 10.0 ** rng.uniform(-1, 3)
+        velocity = step * 10.0 ** rng.uniform(-3, 4) * rng.choice([-1, 1])
+        state = velocity, rng.uniform(-1, 1) * min(change, 50.0 * step), change, step
+        assert stopping_way(*state) <= longest_way(*state)
+
+
 def test_a_joint_beyond_its_stop_is_led_back_and_one_that_is_too_fast_brakes():
     q, v, d, bounds = np.array([0.52]), np.zeros(1), np.zeros(1), np.empty((2, 1))
     limits = limits_of(0.075)
@@ -97,3 +115,15 @@ def test_the_limits_of_the_panda_matter_below_periods_of_4_ms():
         False,
         False,
     ]
+
+
+def test_a_limit_of_jerk_that_no_stop_can_be_computed_with_is_refused():
+    scenario = ikgym.scenarios.get("panda-circle").replace(steps=20)
+    message = (
+        r"jerk_limit: expected at least 4\.35 rad/s³ for joint 'panda_joint1', .*1000 periods of 1 ms, .*got 4\.3\."
+    )
+    for policy in ("qp", "sns", "dls"):
+        with pytest.raises(InvalidInputError, match=message):
+            baselines.make(policy, scenario.replace(jerk_limit=4.3))
+    slow = scenario.replace(jerk_limit=[4.36, 4.36, 4.36, 4.36, 5.23, 5.23, 5.23])
+    assert np.isfinite(baselines.track(slow, "qp").q).all()

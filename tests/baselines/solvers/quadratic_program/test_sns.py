@@ -2,13 +2,15 @@
 
 import numpy as np
 
+import baselines
+import ikgym
 from baselines.solvers.quadratic_program.sns import saturate
 from tests.baselines.solvers.quadratic_program.paths import most_possible
 
 
-def saturated(jacobian, shift, lower, upper, damping=0.0):
+def saturated(jacobian, shift, lower, upper, smooth=False, damping=0.0):
     qdot = np.empty(jacobian.shape[1])
-    return qdot, *saturate(jacobian, shift, damping, lower, upper, qdot)
+    return qdot, *saturate(jacobian, shift, damping, lower, upper, smooth, qdot)
 
 
 def test_the_others_make_up_for_a_joint_at_its_bound():
@@ -59,3 +61,20 @@ def test_bounds_that_leave_out_0_are_kept():
     qdot, _, scaled = saturated(jacobian[:, :1], shift, lower[:1], upper[:1])
     assert (qdot[0], scaled) == (0.5, True)
     assert saturated(np.zeros((2, 3)), np.ones(2), lower, upper)[0].tolist() == [0.5, 0.0, 0.0]
+
+
+def test_where_no_factor_fits_narrow_bounds_leave_as_much_of_the_task_as_they_can():
+    """The first joint is too fast for any share of the task; the second goes on to make its part."""
+    jacobian, shift = np.eye(2), np.array([0.3, 0.3])
+    qdot, _, scaled = saturated(jacobian, shift, np.array([0.5, -1.0]), np.array([0.6, 1.0]), smooth=True)
+    np.testing.assert_allclose(qdot, [0.5, 0.3], rtol=1e-12)
+    assert scaled
+
+
+def test_comes_back_to_its_reference_with_a_third_of_the_jerk_of_the_panda():
+    base = ikgym.scenarios.get("panda-circle").replace(jerk_limit=2500.0, steps=800)
+    q = base.first_q(base.episode(0))
+    off = 5e-3 * np.linalg.pinv(base.arm.jacobian(q)[:3]) @ [0.0, 0.6, 0.8]
+    error = baselines.track(base.replace(start=q + off), "sns").position_error
+    assert error.max() < 5.1e-3
+    assert error[-1] < 5e-6
