@@ -31,7 +31,7 @@ def excite(arm: Arm, seconds: float, period: float, share: float = 0.4, seed: in
         arm: The arm.
         seconds: Duration in [s].
         period: The control period in [s].
-        share: Largest share of the limits of position around home, velocity and acceleration that is used.
+        share: Largest share of the limits of position around home, velocity, acceleration and jerk that is used.
         seed: Of the phases.
 
     Returns:
@@ -64,9 +64,11 @@ def excite(arm: Arm, seconds: float, period: float, share: float = 0.4, seed: in
     travel = np.abs(np.cumsum(qdot, axis=0)).max(axis=0) * period
     room = np.minimum(arm.upper - home, home - arm.lower)
     room = np.where(np.isfinite(room), room, np.pi)
+    jerk = np.diff(np.pad(qdot, ((2, 2), (0, 0))), n=2, axis=0) / period**2
     most = np.array([
         arm.velocity_limit / np.abs(qdot).max(axis=0),
         acceleration / (np.abs(np.diff(qdot, axis=0)).max(axis=0) / period),
+        arm.jerk_limit / np.abs(jerk).max(axis=0),
         room / travel,
     ])  # fmt: skip
     qdot *= share * most.min(axis=0)

@@ -38,7 +38,7 @@ class Options:
     period: Annotated[float, tyro.conf.arg(metavar="S")] = 0.002
     """Control period of the motion."""
     share: float = 0.4
-    """Share of the limits of position, velocity and acceleration that the motion uses."""
+    """Share of the limits of position, velocity, acceleration and jerk that the motion uses."""
 
 
 RULES = (

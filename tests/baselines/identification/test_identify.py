@@ -201,6 +201,16 @@ def test_the_motion_is_within_its_share_clear_and_at_rest_at_both_ends(name):
         assert arm.clearance(q[::5])[0].min() > 0.0
 
 
+@pytest.mark.parametrize("share", [0.2, 0.9])
+def test_the_motion_that_excites_keeps_a_share_of_the_limits_of_jerk(share):
+    """At 1 kHz they bind, and those of acceleration do not."""
+    _, command = excite(ARM, 10.0, 0.001, share)
+    jerk = np.abs(np.diff(np.pad(command, ((2, 2), (0, 0))), n=2, axis=0)).max(axis=0) / 0.001**2
+    np.testing.assert_allclose(jerk, share * ARM.jerk_limit, rtol=1e-9)
+    arm = ARM.replace(jerk_limit=None)
+    assert (np.abs(excite(arm, 10.0, 0.001, share)[1]).max(axis=0) > np.abs(command).max(axis=0)).all()
+
+
 def test_the_command_writes_a_plant_that_scenarios_and_controllers_take(log, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")  # so that no name is broken into two lines
     motion, record_file, plant = (str(tmp_path / name) for name in ("excite.csv", "log.csv", "plant.toml"))
