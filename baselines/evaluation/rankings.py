@@ -15,7 +15,7 @@ from baselines.evaluation.plots import comparison
 from baselines.evaluation.plots.style import png
 from baselines.evaluation.results import slug
 from baselines.evaluation.summary import rank
-from baselines.evaluation.table import markdown, records, to_csv
+from baselines.evaluation.table import markdown, to_csv
 from baselines.files import write
 from baselines.oracle import Search
 from baselines.oracle.several import Wanted, find_all
@@ -51,8 +51,8 @@ def write_ranking(out: pathlib.Path, rows: Iterable[Row], policies: Sequence[str
     write(out / "table.csv", to_csv(lines).encode())
     write(out / "table.md", f"{markdown(lines)}\n".encode())
     for scenario, here in lines.groupby("scenario", sort=False):
-        write(out / f"cost-time-{slug(str(scenario))}.png", png(comparison.cost_time(records(here), str(scenario))))
-    by_name = records(lines.assign(name=lines.policy.str.partition(":")[0]))
+        write(out / f"cost-time-{slug(str(scenario))}.png", png(comparison.cost_time(here, str(scenario))))
+    by_name = lines.assign(name=lines.policy.str.partition(":")[0])
     write(out / "foresight.png", png(comparison.foresight(by_name, "Cost against foresight", "name")))
 
 
@@ -75,4 +75,4 @@ def write_map(out: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], polic
     lines.insert(2, "drives", [float(words[2]) for words in places])
     write(out / "map.csv", to_csv(lines).encode())
     write(out / "map.md", f"{markdown(lines, CELLS)}\n".encode())
-    write(out / "map.png", png(comparison.severity_map(records(lines))))
+    write(out / "map.png", png(comparison.severity_map(lines)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -23,22 +23,14 @@ FLOOR = 0.01
 CUT = 100.0
 #: Values within the first factor have several ticks a decade, within the second evenly spaced ones.
 CLOSE, EVEN = 300.0, 4.0
-#: One line of a table: the name of each column and its value, or the text of it.
-Record = Mapping[str, Any]
+#: Lines of a table: a frame, or the value of each column, or its text, by name.
+Lines: TypeAlias = pd.DataFrame | Sequence[Mapping[str, Any]]
 #: Columns of numbers.
 NUMBERS = ("cost_ratio", "low", "high", "time_p99_us", "foresight", "episodes", "lost_percent", "knowledge", "drives")
 EXCESS = "cost above the reference [%]"
 
 
-def front(lines: Sequence[Record]) -> list[Record]:
-    """The Pareto front, fast to slow: lines that no other beats in both 99th percentile of the time and cost ratio.
-
-    Lines without times, or with fewer episodes than others, are left out.
-    """
-    return [lines[place] for place in _front(_frame(lines)).index]
-
-
-def cost_time(lines: Sequence[Record], title: str) -> Figure:
+def cost_time(lines: Lines, title: str) -> Figure:
     """Excess cost against the 99th percentile of the time per call, with intervals and the Pareto front.
 
     All policies have a name in the legend if there are colours enough; else those of the front.
@@ -60,7 +52,7 @@ def cost_time(lines: Sequence[Record], title: str) -> Figure:
     return drawn
 
 
-def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
+def foresight(lines: Lines, title: str, by: str) -> Figure:
     """Excess cost against foresight, with intervals: a panel per scenario, a series per value of the column `by`."""
     drawn, table = style.figure(3.4), _frame(lines)
     scenarios, series = table.scenario.unique(), table[by].unique()
@@ -79,7 +71,7 @@ def foresight(lines: Sequence[Record], title: str, by: str) -> Figure:
     return drawn
 
 
-def severity_map(lines: Sequence[Record]) -> Figure:
+def severity_map(lines: Lines) -> Figure:
     """Cost ratios over two severities of the plant, one panel per policy; below them the share of lost episodes."""
     panels_of = list(_frame(lines).groupby("policy", sort=False))
     across = min(len(panels_of), 2)
@@ -111,9 +103,9 @@ def _severities(axes: Axes, policy: str, table: pd.DataFrame) -> AxesImage:
     return shade
 
 
-def _frame(lines: Sequence[Record]) -> pd.DataFrame:
+def _frame(lines: Lines) -> pd.DataFrame:
     """The lines with numbers, NaN for none, and costs above the reference in [%] with the ends of their interval."""
-    table = pd.DataFrame(list(lines))
+    table = pd.DataFrame(lines)
     table = table.assign(**{name: pd.to_numeric(table[name], errors="coerce") for name in NUMBERS if name in table})
     ends = {"excess": table.cost_ratio, "excess_low": table.low, "excess_high": table.high}
     return table.assign(**{k: (100.0 * (v.fillna(table.cost_ratio) - 1.0)).clip(lower=FLOOR) for k, v in ends.items()})
@@ -124,6 +116,10 @@ def _is_timed(table: pd.DataFrame) -> pd.Series:
 
 
 def _front(table: pd.DataFrame) -> pd.DataFrame:
+    """The Pareto front, fast to slow: lines that no other beats in both 99th percentile of the time and cost ratio.
+
+    Lines without times, or with fewer episodes than others, are left out.
+    """
     timed = table[_is_timed(table) & (table.episodes == table.episodes.max())]
     timed = timed.sort_values(["time_p99_us", "cost_ratio"])
     return timed[timed.cost_ratio < timed.cost_ratio.cummin().shift(fill_value=np.inf)]
