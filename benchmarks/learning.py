@@ -2,8 +2,8 @@
 
 Trains each algorithm in each environment with each seed, a process a core, and plays the last model on episodes of the
 split `test`. ``docs/results/learning_runs.csv`` keeps the curves; a run that stands there with the same settings is not
-repeated, so the command may be killed and continued. ``docs/results/learning.csv`` has a line for each algorithm and
-environment, ``docs/images/learning.png`` the curves.
+repeated, so the command may be killed and continued. Runs with the settings `former` had another reward.
+``docs/results/learning.csv`` has a line for each algorithm and environment, ``docs/images/learning.png`` the curves.
 """
 
 from __future__ import annotations
@@ -126,11 +126,11 @@ def picture(lines: Sequence[Line]) -> Figure:
     handles: Line = {}
     for (env, algorithm, kind), found in sorted(_groups(lines).items()):
         look = {**style.looks(list(ALGORITHMS).index(algorithm)), "lw": 0.8}
-        label = f"{algorithm}, defaults" if kind == "defaults" else algorithm
+        label = algorithm if kind == "published" else f"{algorithm}, {kind}"
         for _, seed in itertools.groupby(found, lambda line: line["seed"]):
             rows = list(seed)
             minutes = [float(row["core_seconds"]) / 60.0 for row in rows]
-            shade = {"alpha": 0.5, "linestyle": ":"} if kind == "defaults" else {}
+            shade = {} if kind == "published" else {"alpha": 0.5, "linestyle": ":"}
             (handles[label],) = panels[env].plot(minutes, [float(row["score"]) for row in rows], **look | shade)
     for env, axes in panels.items():
         style.dress(axes, title=env, xlabel="core-minutes", ylabel="score", ticks=4)

@@ -48,15 +48,15 @@ __all__ = [
 
 __version__ = "0.2.0"
 
-# Learning environments, see ikgym.rl.ids: steps of an episode, and the mean return of `dls` with a score of 0.8, of
+# Learning environments, see ikgym.rl.ids: steps of an episode, and the mean return at a score of 0.8, of
 # ``python -m benchmarks.yardsticks``.
 _LEARNING = {
-    "Reach": (100, 70.0),
-    "Track": (200, 170.0),
-    "Fast": (200, 95.0),
-    "Limits": (200, 165.0),
-    "Camera": (300, 105.0),
-    "Payload": (300, 175.0),
+    "Reach": (100, 46.2),
+    "Track": (200, 197.6),
+    "Fast": (200, 183.3),
+    "Limits": (200, 195.0),
+    "Camera": (300, 298.0),
+    "Payload": (300, 285.2),
 }
 
 

@@ -437,7 +437,7 @@ REFUSED = [
     ("lost_distance", lambda: ikgym.rl.make(FAST, lost_distanc=1.0)),
     ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
-        ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("zero", 0.0), ("fine", 0.0), ("history", 0),
+        ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("half", 0.0), ("fine", 0.0), ("history", 0),
     )),
 ]  # fmt: skip
 

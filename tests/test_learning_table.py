@@ -24,16 +24,11 @@ def test_the_table_is_that_of_the_curves():
     assert to_csv(learning.table(CURVES)) == learning.TABLE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("env", "algorithm", "least"), [
-    ("ikgym/Track-v0", "ppo", 0.5), ("ikgym/Track-v0", "sac", 0.5), ("ikgym/Track-v0", "td3", 0.5),
-    *((env, algorithm, 0.3) for env in ("ikgym/Fast-v0", "ikgym/Limits-v0") for algorithm in ("ppo", "sac")),
-    ("ikgym/Reach-v0", "ppo", 0.5), ("ikgym/Reach-v0", "sac", 0.5), ("ikgym/Reach-v0", "td3", 0.3),
-])  # fmt: skip
-def test_what_agents_learn_within_ten_minutes(env, algorithm, least):
-    [line] = [one for one in learning.table(PUBLISHED) if (one["environment"], one["algorithm"]) == (env, algorithm)]
-    assert line["score"] >= least
-    assert line["seeds"] == 5
-    assert line["core_minutes"] <= 10.0
+def test_what_agents_learn_within_ten_minutes():
+    for line in learning.table(CURVES):
+        assert line["score"] >= 0.4
+        assert line["seeds"] == 5
+        assert line["core_minutes"] <= 10.0
 
 
 def test_algorithms_are_trained_where_settings_are_published():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import gymnasium as gym
@@ -49,8 +48,9 @@ class LearningEnv(RedundantIKEnv, gym.Env[Any, Any]):  # listed, since skrl look
     def step(self, action: npt.ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """One step, see :class:`ikgym.rl.Task`."""
         fractions = self._learner.actions(action)
-        seen, _, terminated, truncated, info = super().step(fractions)
-        reward = self._learner.rewards(lambda key: np.array([info[key]]))[0].item()
+        before = self._step
+        seen, cost, terminated, truncated, info = super().step(fractions)
+        reward = float(self._learner.rewards(np.array([-cost]), before)[0])
         return self._learner.observe(_one_row(seen), self.context[None], LATER)[0], reward, terminated, truncated, info
 
 
@@ -87,8 +87,9 @@ class LearningVectorEnv(RedundantIKVectorEnv, gym.vector.VectorEnv[Any, Any, Any
     def step(self, actions: npt.ArrayLike) -> tuple[Any, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """One step of all arms, see :class:`ikgym.rl.Task`."""
         fractions, waiting, begun = self._learner.actions(actions), self._ended, self._none
-        seen, _, terminated, truncated, infos = super().step(fractions)
-        rewards = self._learner.rewards(functools.partial(_step_value, infos, self.num_envs))
+        before = self._simulator.steps_made.copy()
+        seen, costs, terminated, truncated, infos = super().step(fractions)
+        rewards = self._learner.rewards(-costs, before)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             begun = waiting
             rewards[begun] = 0.0  # these rows have begun an episode, and taken no step
@@ -151,10 +152,3 @@ def _arguments(task: Any) -> dict[str, Any]:
 def _one_row(seen: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """An observation without a row axis as that of one row."""
     return {key: value[None] for key, value in seen.items()}
-
-
-def _step_value(infos: dict[str, Any], rows: int, key: str) -> FloatArray:
-    """A value of the step just made, also of rows whose next episode has begun since; 0 without a step. Shape (N,)."""
-    found: FloatArray = infos.get(key, np.zeros(rows))
-    final = infos.get("final_info", {}).get(key)
-    return found if final is None else np.where(infos["_final_info"], final, found)

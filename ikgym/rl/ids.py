@@ -73,14 +73,16 @@ class ReachEnv(TaskEnv):
 
     | other than in `ikgym/Track-v0` | |
     |---|---|
-    | observation space | `Box(-5.0, 5.0, (26,), float32)`: indices 0 to 25, of the target; units 0.3 m, 1 rad |
-    | reward | 1 − log(1 + d² + Φ^U) / log(1 + 300²): 0 is 0.3 m off |
+    | observation space | `Box(-5.0, 5.0, (26,), float32)`: indices 0 to 25, of the target; units 0.3 m, 0.3 rad |
+    | reward | 1 / (1 + √c / 10); 0 in the first 50 steps |
     | starting state | home, at rest |
     | episode end | truncated after 100 steps, never terminated |
     | score | of the last 50 steps |
     """
 
-    task = Task(scenario="learning-reach", ahead=(0.02,), lost_distance=None, zero=0.3, coarse=0.3, counted=50)
+    task = Task(
+        scenario="learning-reach", ahead=(0.02,), lost_distance=None, half=0.01, steepness=1, coarse=0.3, counted=50
+    )
     metadata: ClassVar[dict[str, Any]] = {**TaskEnv.metadata, "render_fps": 50}  # type: ignore[misc]
 
 
@@ -92,7 +94,7 @@ class TrackEnv(TaskEnv):
     motion is the reference; the joints may move otherwise. Scenario: `learning-track`.
 
     ## Action space
-    `Box(-1.0, 1.0, (7,), float32)`: joint velocities as shares of 0.6 of their limits, 2.175 rad/s in joints 1 to 4
+    `Box(-1.0, 1.0, (7,), float32)`: joint velocities as shares of 0.8 of their limits, 2.175 rad/s in joints 1 to 4
     and 2.61 rad/s in joints 5 to 7. The arm has them at once; its accelerations are not limited.
 
     ## Observation space
@@ -102,13 +104,13 @@ class TrackEnv(TaskEnv):
     |---|---|---|
     | 0 – 6 | joint coordinates from home | 1 rad |
     | 7 – 13 | joint velocities last applied | velocity limit |
-    | 14 – 19 | position and orientation error to the reference 1 step ahead, seen from joint 1 | 0.03 m, 0.1 rad |
-    | 20 – 25 | hyperbolic tangent of the same | 0.01 m, 0.033 rad |
+    | 14 – 19 | position and orientation error to the reference 1 step ahead, seen from joint 1 | 0.03 m, 0.03 rad |
+    | 20 – 25 | hyperbolic tangent of the same | 0.01 m, 0.01 rad |
     | 26 – 37 | indices 14 to 25 for the reference 5 steps ahead | |
 
     ## Reward
-    1 − log(1 + d² + Φ^U) / log(1 + 100²), with d² = (position error / 1 mm)² + (orientation error / 3.3 mrad)² and
-    the cost Φ^U of velocities above 1.09 rad/s. 1 is perfect, 0 is 0.1 m off.
+    1 / (1 + c / 25²) of the benchmark's stage cost c = (position error / 1 mm)² + (orientation error / 1 mrad)² + Φ^U,
+    with the cost Φ^U of velocities above 0.8 rad/s. 1 is perfect, 1/2 is 25 mm off.
 
     ## Starting state
     At rest at the first pose of the path.
@@ -117,7 +119,8 @@ class TrackEnv(TaskEnv):
     Truncated after 200 steps; terminated where the tool is more than 0.1 m off.
 
     ## Score
-    :func:`ikgym.rl.score` of the costs of whole episodes: 0 is an arm at rest, 1 is tuned `dls`.
+    :func:`ikgym.rl.score` of the costs of whole episodes: 0 is an arm at rest, 1 the best policy
+    without learning that sees as much.
     """
 
     task = Task()
@@ -133,10 +136,10 @@ class FastEnv(TaskEnv):
     | other than in `ikgym/Track-v0` | |
     |---|---|
     | observation space | `Box(-5.0, 5.0, (38,), float32)` |
-    | reward | Φ^U counts velocities above 0.3 rad/s |
+    | reward | 1 / (1 + c / 60²), where Φ^U counts velocities above 0.3 rad/s |
     """
 
-    task = Task(scenario="learning-fast")
+    task = Task(scenario="learning-fast", half=0.06)
 
 
 class LimitsEnv(TaskEnv):
@@ -150,9 +153,10 @@ class LimitsEnv(TaskEnv):
     |---|---|
     | action space | `Box(-1.0, 1.0, (7,), float32)`: shares of 1 rad/s |
     | observation space | `Box(-5.0, 5.0, (38,), float32)` |
+    | reward | 1 / (1 + √c / 100) |
     """
 
-    task = Task(scenario="learning-limits", share=1.0)
+    task = Task(scenario="learning-limits", share=1.0, half=0.1, steepness=1)
 
 
 class CameraEnv(TaskEnv):
@@ -168,11 +172,11 @@ class CameraEnv(TaskEnv):
     | observation space | `Box(-5.0, 5.0, (272,), float32)`: the last four observations, newest first; \
 after index 37 each has the ages of joint coordinates and pose in units of ten steps, and the last four commands in \
 units of the velocity limit |
-    | reward | of the true errors, which are not observed |
+    | reward | 1 / (1 + c / 70²), of the true errors, which are not observed |
     | episode end | truncated after 300 steps |
     """
 
-    task = Task(scenario="learning-camera", history=4, commands=4, share=0.5)
+    task = Task(scenario="learning-camera", history=4, commands=4, share=0.5, half=0.07)
 
 
 class PayloadEnv(TaskEnv):
@@ -188,11 +192,11 @@ class PayloadEnv(TaskEnv):
     | observation space | `Box(-5.0, 5.0, (272,), float32)`: the last four observations, newest first; \
 after index 37 each has the ages of joint coordinates and pose in units of ten steps, and the last four commands in \
 units of the velocity limit |
-    | reward | of the true errors |
+    | reward | 1 / (1 + c / 30²), of the true errors |
     | episode end | truncated after 300 steps |
     """
 
-    task = Task(scenario="learning-payload", history=4, commands=4, share=0.5)
+    task = Task(scenario="learning-payload", history=4, commands=4, share=0.5, half=0.03)
 
 
 #: The environments by id.

@@ -1,4 +1,4 @@
-"""Scores of agents in the environments by id: 0 is an arm at rest, 1 is tuned damped least squares."""
+"""Scores of agents in the environments by id: 0 is an arm at rest, 1 is the best known without learning."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def environment(name: str) -> type[TaskEnv]:
 
 
 def yardsticks(name: str, split: str, episodes: int) -> dict[str, float]:
-    """Mean logarithms of 1 + cost over the first episodes of a split: `still`, `dls` and `best`."""
+    """Mean logarithms of 1 + cost over the first episodes of a split: `still`, `solver` and `best`."""
     return {policy: float(np.mean(values[:episodes])) for policy, values in _yardsticks()[split][name].items()}
 
 
@@ -147,7 +147,7 @@ def _score(name: str, value: Any, split: str) -> Score:
     yardstick = yardsticks(name, split, episodes)
 
     def to_score(logarithm: Any) -> Any:
-        return (yardstick["still"] - logarithm) / (yardstick["still"] - yardstick["dls"])
+        return (yardstick["still"] - logarithm) / (yardstick["still"] - yardstick["solver"])
 
     seeds = to_score(np.log1p(cost).mean(axis=1))
     drawn = np.random.default_rng(0).choice(seeds, (RESAMPLES, len(seeds)))

@@ -43,13 +43,12 @@ class Task(Frozen):
     newest first: where measurements are late or missing, earlier commands and measurements tell where the arm is now.
     An episode begins with its first observation repeated.
 
-    *Rewards.* Of size 1, from the true errors and the costs of velocities and, where the scenario has it, proximity:
+    *Rewards.* From 0 to 1, of the stage cost c, which counts true errors, velocities and proximity:
 
-        reward = 1 − log(1 + (d / 1 mm)² + Φ^U + Φ^C) / log(1 + (D / 1 mm)²)
-        d² = (position error)² + (L · orientation error)²
+        reward = 1 / (1 + (√c · 1 mm / h)^k)
 
-    D is `zero` and L is `radian`. With L = 1 m, Δx = 1 mm and P_X = 2 this is
-    1 − log(1 + stage cost) / log(1 + (D / 1 mm)²). It is negative beyond D.
+    h is `half`, k `steepness`. With Δx = 1 mm and P_X = 2, √c · 1 mm is a distance where 1 rad counts as 1 m. The
+    reward is 0 in steps that are not `counted`.
 
     Args:
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
@@ -58,11 +57,12 @@ class Task(Frozen):
         history: Number of observations shown side by side, from 1 to 1000.
         commands: h, the number of past commands shown.
         share: Share of the largest joint velocities that an action of 1 means, above 0.
-        radian: Weight of 1 rad in [m], in observation and reward, above 0.
-        zero: Distance without reward in [m], above 0.
+        radian: Weight of 1 rad in [m], in the observation, above 0.
+        half: Distance with the reward 1/2 in [m], above 0.
+        steepness: k, 1 or 2; rewards with 1 span more decades of distances.
         coarse: Unit of errors in the observation, in [m], above 0.
         fine: Unit of the hyperbolic tangent of the same, in [m], above 0.
-        counted: Steps at the end of an episode whose cost is scored; None for all.
+        counted: Steps at the end of an episode that are rewarded and scored; None for all.
         context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
 
     Raises:
@@ -74,9 +74,10 @@ class Task(Frozen):
     lost_distance: float | None = 0.1
     history: int = 1
     commands: int = 0
-    share: float = 0.6
-    radian: float = 0.3
-    zero: float = 0.1
+    share: float = 0.8
+    radian: float = 1.0
+    half: float = 0.025
+    steepness: int = 2
     coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
@@ -86,8 +87,9 @@ class Task(Frozen):
         whole_number("history", self.history, at_least=1, at_most=MOST_HISTORY)
         if self.counted is not None:
             whole_number("counted", self.counted, at_least=1)
+        whole_number("steepness", self.steepness, at_least=1, at_most=2)
         flag("context", self.context)
-        for name in ("share", "radian", "zero", "coarse", "fine"):
+        for name in ("share", "radian", "half", "coarse", "fine"):
             number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)
 
     def arguments(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,19 +12,17 @@ from gymnasium import spaces
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.rl.task import Task
-from ikgym.rl.track_kernels import MOST, distance_rewards, track_rows
+from ikgym.rl.track_kernels import MOST, track_rows
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
 from ikgym.validation import BoolArray, FloatArray, shortened
 
-#: Error in [m] below which an agent gains little more: Δx of the cost.
+#: Error in [m] that costs 1: Δx of the cost.
 UNIT = 1e-3
 #: Steps that count as 1 in ages of measurements.
 OLDEST = 10.0
 #: Observations of N rows, or of one without a row axis.
 Features = npt.NDArray[np.float32]
-#: Gives a value of `info` by its key, for the steps that are rewarded. Shape (N,).
-StepValue = Callable[[str], FloatArray]
 
 
 class Learner:
@@ -57,8 +55,7 @@ class Learner:
         self._fraction = task.share * self._fastest / scenario.velocity_limit
         self.action_space = spaces.Box(-1.0, 1.0, self._fraction.shape, np.float32)
         self._shape = self._fraction.shape if rows is None else (rows, scenario.joints)
-        self._scales = task.radian, UNIT, task.zero
-        self._oriented, self._near = scenario.task.has_orientation, scenario.proximity is not None
+        self._slope, self._from = (task.half, task.steepness), scenario.steps - (task.counted or scenario.steps)
 
     def reset(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
         """The observations after a reset; where no episode has begun, they are those of the last step.
@@ -101,14 +98,14 @@ class Learner:
         fractions: FloatArray = np.clip(raw.astype(np.float64), -1.0, 1.0) * self._fraction
         return fractions
 
-    def rewards(self, value: StepValue) -> FloatArray:
-        """Rewards from the costs and errors of the step. Shape (N,)."""
-        position = value("position_error")
-        orientation = value("orientation_error") if self._oriented else np.zeros(len(position))
-        others = value("velocity_cost") + value("proximity_cost") if self._near else value("velocity_cost")
-        out = np.empty(len(position))
-        distance_rewards(self._scales, position, orientation, others, out)
-        return out
+    def rewards(self, cost: FloatArray, before: npt.ArrayLike) -> FloatArray:
+        """Rewards of steps.
+
+        Args:
+            cost: Their stage costs. Shape (N,).
+            before: Steps that the episodes had before. Shape (N,) or ().
+        """
+        return np.where(np.asarray(before) < self._from, 0.0, cost_rewards(cost, *self._slope))
 
     def _shown(self, features: Features, begun: BoolArray) -> Features:
         self._history[begun] = features[begun, None]
@@ -126,6 +123,12 @@ class Learner:
         """Past commands as shares of the largest joint velocities, ages in units of ten steps."""
         scaled: FloatArray = np.clip(value / (self._fastest if key == "commands" else OLDEST), -MOST, MOST)
         return scaled
+
+
+def cost_rewards(cost: FloatArray, half: float, steepness: int) -> FloatArray:
+    """Rewards 1 / (1 + (√c · 1 mm / h)^k) of stage costs c, see :class:`ikgym.rl.Task`. Shapes (...)."""
+    rewards: FloatArray = 1.0 / (1.0 + (np.sqrt(cost) * (UNIT / half)) ** steepness)
+    return rewards
 
 
 def joint_scales(arm: Arm) -> tuple[FloatArray, FloatArray]:

@@ -49,21 +49,3 @@ def track_rows(kind, chain, scales, home, units, fastest, q, qdot, pose, nominal
                 out[row, at + a] = min(max(distance / coarse, -MOST), MOST)
                 out[row, at + w + a] = math.tanh(distance / fine)
             at += 2 * w
-
-
-@kernel
-def distance_rewards(scales, position, orientation, others, out):
-    """Rewards of N rows, see :class:`ikgym.rl.Task`.
-
-    Args:
-        scales: Weight of 1 rad in [m], unit of distances and distance without reward in [m].
-        position: Position errors in [m]. Shape (N,).
-        orientation: Orientation errors in [rad]. Shape (N,).
-        others: The other costs of the step. Shape (N,).
-        out: Receives the rewards. Shape (N,).
-    """
-    radian, unit, zero = scales
-    most = math.log1p((zero / unit) ** 2)
-    for row in range(out.shape[0]):
-        square = (position[row] / unit) ** 2 + (radian * orientation[row] / unit) ** 2
-        out[row] = 1.0 - math.log1p(square + others[row]) / most

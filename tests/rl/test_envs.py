@@ -31,7 +31,7 @@ def context(seed):
     [
         rl.Task(short(), lost_distance=0.12, share=0.02, history=2, commands=2),
         rl.Task(short("panda-camera-slow"), lost_distance=0.0003, history=2, commands=2),
-        rl.Task(CONTEXT, lost_distance=None, context=True),
+        rl.Task(CONTEXT, lost_distance=None, context=True, counted=3),
     ],
     ids=lambda task: task.scenario.name,
 )
@@ -65,7 +65,7 @@ def test_the_reference_is_shown_at_times_ahead(dt, steps):
 def test_what_an_arm_sees_of_a_task(name, task):
     """Before a step in which the arm is at rest: the errors of that step, seen from joint 1."""
     scenario = ikgym.scenarios.get(name).replace(task=ikgym.tasks.get(task))
-    env = rl.make(scenario, ahead=(scenario.dt,), zero=50.0, coarse=50.0, fine=5.0, radian=0.5, lost_distance=None)
+    env = rl.make(scenario, ahead=(scenario.dt,), half=50.0, coarse=50.0, fine=5.0, radian=0.5, lost_distance=None)
     arm = scenario.model
     start = np.where(arm.prismatic, 0.2, 0.3) if arm.home is None else np.array(arm.home) + 0.1
     features, _ = env.reset(seed=3, options={"q": start})
@@ -80,8 +80,8 @@ def test_what_an_arm_sees_of_a_task(name, task):
         missing = ikgym.kernels.rotations.rodrigues(arm.chain.axes[0], -start[0]) @ missing
     np.testing.assert_allclose(coarse[:3], missing, rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(features[2 * arm.joints :].reshape(2, -1)[1], np.tanh(units / 5.0), atol=1e-5)
-    square = info["position_error"] ** 2 + (0.5 * info.get("orientation_error", 0.0)) ** 2
-    assert reward == pytest.approx(1.0 - np.log1p(1e6 * square) / np.log1p(1e6 * 50.0**2), rel=1e-12)
+    cost = info["tracking_cost"] + info["velocity_cost"]
+    assert reward == pytest.approx(1.0 / (1.0 + cost / 50e3**2), rel=1e-12)
 
 
 def test_joints_are_seen_from_home_or_the_middle_of_their_range():

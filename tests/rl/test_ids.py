@@ -112,14 +112,16 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
 
 @every_id
 def test_rewards_are_what_the_class_says(name):
-    env = gym.make(name)
-    task = env.unwrapped.task
+    env = gym.make(name, lost_distance=None)
+    task, steps = env.unwrapped.task, env.spec.max_episode_steps
+    stated = f"/ {1000 * task.half:g}" + "²" * (task.steepness == 2)
+    assert stated in type(env.unwrapped).__doc__
     env.reset(seed=0)
-    for action in actions_of(env, 10):
+    for step, action in enumerate(actions_of(env, steps)):
         _, reward, _, _, info = env.step(action)
-        square = info["position_error"] ** 2 + (task.radian * info["orientation_error"]) ** 2
-        lost = np.log1p(1e6 * square + info["velocity_cost"]) / np.log1p(1e6 * task.zero**2)
-        assert reward == pytest.approx(1.0 - lost, rel=1e-12)
+        distance = np.sqrt(info["tracking_cost"] + info["velocity_cost"]) / (1000.0 * task.half)
+        counts = step >= steps - (task.counted or steps)
+        assert reward == pytest.approx(counts / (1.0 + distance**task.steepness), rel=1e-12)
 
 
 @every_id
