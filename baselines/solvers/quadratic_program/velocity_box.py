@@ -31,9 +31,8 @@ def braking_speed(room, change):
 
 @inlined
 def _towards(distance, dt, change, fastest):
-    """The largest velocity towards a stop; where the joint is beyond it, the one that leads back."""
-    room = distance / dt
-    return min(braking_speed(room, change), fastest) if room >= 0.0 else max(room, -fastest)
+    """The largest velocity towards a stop; where the joint is beyond it, the one that leads back and ends there."""
+    return math.copysign(min(braking_speed(abs(distance) / dt, change), fastest), distance)
 
 
 @uncounted
@@ -42,7 +41,8 @@ def velocity_box(limits, dt, q, last, lower, upper):
 
     Where limits contradict each other, since the joint was too fast before, the acceleration limit wins: a joint that
     cannot brake in time brakes as hard as it can, and one beyond its velocity limit likewise. Where a joint is beyond a
-    stop (of a model whose stops are not those of the arm) it is led back, and the opposite stop gives way.
+    stop (of a model whose stops are not those of the arm) it is led back, no faster than it can come to rest at the
+    stop, and the opposite stop gives way.
 
     Args:
         limits: See :class:`Model`. Shape (5, n).
@@ -198,6 +198,6 @@ def smooth_box(limits, dt, q, last, change, lower, upper):
             upper[j] = _fastest_forward(above, v, d, most, step, fastest)
             lower[j] = -_fastest_forward(below, -v, -d, most, step, fastest)
             if above < 0.0:  # beyond a stop: led back
-                upper[j] = min(max(above, -fastest, lower[j]), quickest)
+                upper[j] = min(max(-_fastest_forward(-above, -v, -d, most, step, fastest), lower[j]), quickest)
             elif below < 0.0:
-                lower[j] = max(min(-below, fastest, upper[j]), slowest)
+                lower[j] = max(min(_fastest_forward(-below, v, d, most, step, fastest), upper[j]), slowest)

@@ -38,6 +38,24 @@ def test_the_acceleration_limit_takes_precedence_over_the_stop(drives, beyond, n
     assert q[JOINT] <= scenario.arm.upper[JOINT] + noise
 
 
+@pytest.mark.parametrize("jerk", [np.inf, 5000.0])
+@pytest.mark.parametrize("policy", ["qp", "sns"])
+def test_a_joint_is_led_back_to_its_stop_and_no_farther(policy, jerk):
+    """With the tool held beyond it."""
+    scenario, q = standing("panda", 1e-3, 9e-3)
+    scenario = scenario.replace(jerk_limit=jerk)
+    controller = Controller(scenario, policy, Drives(), guards=ANY)
+    there = np.tile(scenario.task.coordinates(*scenario.arm.forward(q)), (controller.ahead, 1))
+    stop, most, last = scenario.arm.upper[JOINT], scenario.dt * scenario.arm.acceleration_limit, np.zeros((2, 7))
+    for _ in range(100):
+        command = controller.step(q, None, there)
+        assert (np.abs(command - last[0]) <= most + 1e-12).all()
+        assert (np.abs(command - 2.0 * last[0] + last[1]) <= scenario.dt**2 * jerk + 1e-12).all()
+        q, last = q + scenario.dt * command, np.array([command, last[0]])
+        assert q[JOINT] >= stop - 1e-6
+    assert q[JOINT] == pytest.approx(stop, abs=1e-6)
+
+
 def test_a_joint_without_acceleration_limit_is_led_back_as_a_stop_is_made():
     scenario, q = standing("ur10", 4e-3, 9e-3)
     controller = Controller(scenario, guards=ANY)

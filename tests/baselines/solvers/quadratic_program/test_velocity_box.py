@@ -49,7 +49,8 @@ def box(q, last, lower=-1.0, upper=1.0, fastest=2.0, change=CHANGE):
         ({"q": 1.01, "last": 0.0}, (-0.2, -0.1)),
         ({"q": 1.5, "last": 0.0, "change": np.inf}, (-2.0, -2.0)),
         ({"q": -1.5, "last": 0.0}, (0.2, 0.2)),
-        ({"q": 1.05, "last": -0.4, "lower": 0.99, "change": 0.3}, (-0.5, -0.5)),  # the other stop gives way
+        ({"q": 1.05, "last": -0.4, "change": 0.3}, (-0.7, -0.4)),  # 0.4 + 0.1 = 0.5
+        ({"q": 1.05, "last": -0.4, "lower": 1.03, "change": 0.3}, (-0.4, -0.4)),  # the other stop gives way
     ],
 )
 def test_bounds(given, wanted):
