@@ -13,7 +13,7 @@ import tyro
 
 from baselines.episodes import Policy, Seeds
 from baselines.evaluation import test_sets
-from baselines.evaluation.metrics import Key, Skipped
+from baselines.evaluation.metrics import AT_MARGIN, Key, Skipped
 from baselines.evaluation.policies import (
     ALL,
     AnyPolicy,
@@ -232,7 +232,7 @@ _Episodes = tuple[Scenario, tuple[Seeds, ...], str | None, int]
 
 
 def _episodes(options: Options) -> list[_Episodes]:
-    """The episodes of all scenarios or test sets, and with `pairs` those on ideal plants with the same seeds."""
+    """The episodes of all scenarios or test sets; with the same seeds those at delay margins, and on ideal plants."""
     scenarios = _scenarios(options)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
@@ -251,6 +251,8 @@ def _episodes(options: Options) -> list[_Episodes]:
             _draw(one, some, options.noise_seeds, length=test_sets.sequence(one.name))
             for one, some in zip(scenarios, seeds, strict=True)
         ]
+    if not options.severities:
+        out += [(at_margin(one[0]), *one[1:]) for one in out if one[0].plant.delay_margin]
     if options.pairs:
         known, names = {fingerprint(scenario) for scenario, *_ in out}, dict[str, str]()
         for scenario, seeds_of, *_ in list(out):
@@ -259,6 +261,11 @@ def _episodes(options: Options) -> list[_Episodes]:
                 name = names.setdefault(content, f"{scenario.name}, ideal plant")
                 out.append(_draw(plain.replace(name=name), dict.fromkeys(one.seed for one in seeds_of)))
     return out
+
+
+def at_margin(scenario: Scenario) -> Scenario:
+    """A scenario whose commands come later by the delay margin of its plant."""
+    return scenario.replace(name=scenario.name + AT_MARGIN, plant=scenario.plant.at_margin())
 
 
 def _draw(

@@ -35,6 +35,9 @@ TIME_COLUMNS = ("time_first_us", "time_p50_us", "time_p99_us", "deadline_misses"
 LOST_POSITION, LOST_ORIENTATION = 0.05, 0.3
 #: A path was followed if the errors of all steps that count are at most so large, in [m] and [rad].
 FOLLOWED_POSITION, FOLLOWED_ORIENTATION = 1e-3, 1e-3
+#: What follows the name of a scenario whose plant is at its delay margin, and by how many times the largest error of a
+#: policy that no longer follows its path grows there, at least, where it has too little of a margin.
+AT_MARGIN, GROWTH = ", later", 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,6 +207,11 @@ def lost(position_error: float, orientation_error: float | None) -> bool:
 def is_followed(position_error: float, orientation_error: float | None) -> bool:
     """Whether a path was followed, within 1 mm and 1 mrad; the arguments are those of :func:`lost`."""
     return _within(FOLLOWED_POSITION, FOLLOWED_ORIENTATION, position_error, orientation_error)
+
+
+def lacks_margin(error: float, later: float) -> bool:
+    """Whether a policy loses its path at a delay margin, by its largest position errors without and at it, in [m]."""
+    return not (later <= FOLLOWED_POSITION or later <= GROWTH * error)
 
 
 def _within(distance: float, angle: float, position_error: float, orientation_error: float | None) -> bool:

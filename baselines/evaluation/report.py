@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from baselines.evaluation.metrics import LOST_ORIENTATION, LOST_POSITION, Skipped
+from baselines.evaluation.metrics import AT_MARGIN, LOST_ORIENTATION, LOST_POSITION, Skipped, lacks_margin
 from baselines.evaluation.summary import FOLLOWED_NOTE, POLICIES, SPREAD, WITH_IDEAL, columns, escape_names
 from baselines.evaluation.table import NOTHING, plain
 from baselines.oracle import best_known
@@ -127,8 +127,16 @@ def remarks(lines: pd.DataFrame, skipped: Sequence[Skipped] = ()) -> list[str]:
         for (policy, scenario), some in lines.groupby(["policy", "scenario"], sort=False)
         if (seeds := [*itertools.chain(*some.beaten)])
     ]
+    known = {(one.scenario, one.label, one.text): one.position_error_mm for one in lines.itertuples()}
+    warnings = [
+        f"warning: {label} loses the path of {scenario} where commands come later by the delay margin of its plant: "
+        f"{later:.3g} mm instead of {error:.3g} mm; on the arm that was identified it may, too"
+        for (scenario, label, text), error in known.items()
+        if (later := known.get((scenario + AT_MARGIN, label, text))) is not None
+        and lacks_margin(1e-3 * error, 1e-3 * later)
+    ]
     left_out = [f"skipped: {one.policy} in {one.scenario}: {one.reason}" for one in skipped]
-    return [*(note for note, applies in notes.items() if applies), *beaten, *left_out]
+    return [*(note for note, applies in notes.items() if applies), *beaten, *warnings, *left_out]
 
 
 def machines(lines: pd.DataFrame) -> list[str]:

@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.signal import lfilter
@@ -44,7 +45,7 @@ class Lag:
         delay: In periods.
         time_constant: T in [s], 0 for none: a step closes the share 1 − exp(−Δt/T) of the gap.
         gain: The steady gain.
-        deviations: Standard deviations of delay, time constant, gain and latency, which is delay + T/Δt in periods.
+        deviations: Standard deviations of delay, time constant, gain and latency, the mean of the response in periods.
     """
 
     delay: float
@@ -120,6 +121,11 @@ def _share(period: float, constant: float) -> float:
     return 1.0 - math.exp(-period / constant) if constant > 0.0 else 1.0
 
 
+def _latency(lag: Lag, period: float) -> float:
+    """The mean of the response of a delay and a lag, in periods."""
+    return lag.delay + 1.0 / _share(period, lag.time_constant) - 1.0
+
+
 def _lagged(part: Part, whole: int, constant: float) -> FloatArray:
     """Commands behind a lag, whole periods late and one more. Shape (k, 2)."""
     share = _share(part.period, constant)
@@ -146,9 +152,10 @@ def _coarse(part: Part, constant: float, lowest: int, longest: int, where: Float
     share = _share(part.period, constant)
     out, y = lfilter([share], [1.0, share - 1.0], part.u), np.where(where, part.y, 0.0)
     power = float(out[where] @ out[where])
-    mixed = [max(float(part.late(whole, out) @ y), 0.0) for whole in range(lowest, longest)]
-    whole = int(np.argmax(mixed))
-    return float(y @ y) - mixed[whole] ** 2 / max(power, 1e-300), lowest + whole, constant
+    size = next_fast_len(len(y) + longest, real=True)
+    products = irfft(rfft(out, size).conj() * rfft(y, size), size)[np.arange(lowest, longest)]  # of late outputs with y
+    whole = int(np.argmax(products))
+    return float(y @ y) - max(products[whole], 0.0) ** 2 / max(power, 1e-300), lowest + whole, constant
 
 
 def _refined(part: Part, whole: int, guess: float, where: FloatArray) -> tuple[float, int, float]:
@@ -207,7 +214,8 @@ def _deviations(part: Part, delay: float, constant: float, gain: float, where: A
     np.add.at(scores, part.block[where], slopes * rest[:, None])
     inverse = np.linalg.pinv(slopes.T @ slopes)
     spread = inverse @ (scores.T @ scores) @ inverse
-    latency = np.array([1.0, 1.0 / part.period, 0.0])
+    ratio = part.period / base[1]
+    latency = np.array([1.0, ratio / base[1] / (4.0 * math.sinh(0.5 * ratio) ** 2), 0.0])
     variances = [*np.diag(spread), latency @ spread @ latency]
     return tuple(math.sqrt(max(float(variance), 0.0)) for variance in variances)
 
@@ -313,7 +321,7 @@ def _halves(part: Part) -> tuple[tuple[float, float], tuple[float, float]] | Non
     if gentle.sum() < 2 or (~gentle).sum() < 2:
         return None
     found = [fit_lag(part, chosen[part.block]) for chosen in (gentle, power >= 0.5 * power.max())]
-    first, second = ((one.delay + one.time_constant / part.period, one.gain) for one in found)
+    first, second = ((_latency(one, part.period), one.gain) for one in found)
     return first, second
 
 

@@ -23,12 +23,16 @@ from ikgym.scenarios.files import document
 from ikgym.validation import FloatArray
 
 #: Commands look like measured velocities where all latencies are below the first of these, in periods, and either below
-#: the second one with such a small error, as a share of the motion, or the motion comes earlier by the last one.
-SOON, INSTANT, EXACT, EARLY = 1.0, 0.3, 0.01, 0.2
+#: the second one with such a small error, as a share of the motion, or the motion comes earlier by the fourth one, or
+#: it has less than the last one, as a share, of what is fastest in the commands: the rest is noise of a measurement.
+SOON, INSTANT, EXACT, EARLY, FOLLOWED = 3.0, 0.3, 0.01, 0.2, 0.5
 #: Largest error of a motion that a fit explains, as a share of it.
 EXPLAINED = 0.5
 #: Gains that come of degrees instead of radians.
 DEGREES = 180.0 / math.pi
+#: Periods of delay on top of what was found, at which policies are evaluated as well: no model of single joints knows
+#: how they pull at each other.
+MARGIN = 1.0
 #: Differences of gentle and excited parts that count: in periods, and of the gain.
 APART = (0.5, 0.05)
 
@@ -60,13 +64,12 @@ class Identified:
         delays = np.array([lag.delay for lag in lags])
         if self.shaped:
             delay, rows = zip(*(_shape(joint, period) for joint in self.joints), strict=True)
-            plant = Plant(command_delay=_numbers(delay), drive=tuple(rows))
+            plant = Plant(command_delay=_numbers(delay), delay_margin=MARGIN, drive=tuple(rows))
         else:
             with np.errstate(divide="ignore"):
                 bandwidth = _numbers(1.0 / (2.0 * math.pi * constants))
-            plant = Plant(
-                command_delay=_numbers(delays), bandwidth=bandwidth, gain=_numbers([lag.gain for lag in lags])
-            )
+            gain = _numbers([lag.gain for lag in lags])
+            plant = Plant(command_delay=_numbers(delays), delay_margin=MARGIN, bandwidth=bandwidth, gain=gain)
         later = np.maximum(delays - half_period(constants / period), 0.0)
         return IdentifiedPlant(
             self.arm.name, tuple(self.arm.joint_names), period, plant, tuple(later.tolist()), tuple(constants.tolist())
@@ -133,7 +136,7 @@ class Identified:
             "arm": found.arm,
             "joints": list(found.joints),
             "period": found.period,
-            "plant": {name: np.array(value) for name, value in found.plant.switched_on().items()},
+            "plant": {name: np.array(v) if np.ndim(v) else v for name, v in found.plant.switched_on().items()},
             "drives": {"delay": found.delay, "time_constant": found.time_constant},
         }
         try:
@@ -158,7 +161,7 @@ class Identified:
                 speed = (values[1:] - leak * values[:-1]) / self.log.period
                 ax.plot(time[1:], speed[rows[:-1]], style, linewidth=1.0, label=label)
             ax.set_ylabel(f"{self.joints[j].name}\n[{'m' if self.arm.prismatic[j] else 'rad'}/s]", fontsize=8)
-        axes[0].legend(loc="upper right", ncols=3, fontsize=8)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         axes[-1].set_xlabel("time [s]")
         figure.savefig(file)
 
@@ -178,8 +181,8 @@ def identify(log: Log, arm: Arm) -> Identified:
         early = [_precedes(log, arm, joint) for joint in joints]
         if any(early) and all(one or not joint.moved for one, joint in zip(early, joints, strict=True)):
             raise InvalidInputError(
-                "command: expected commands, which come before the motion, got columns that come with it or after it: "
-                "these look like measured velocities, or q like a motion that no arm has made."
+                "command: expected commands, which come before the motion, got columns that come with it or after it, "
+                "or have noise that it lacks: these look like measured velocities, or q like a motion that no arm made."
             )
     if not moved:
         raise InvalidInputError("expected joints that move as they are commanded, got none that moved enough to tell.")
@@ -195,7 +198,7 @@ def identify(log: Log, arm: Arm) -> Identified:
 
 
 def _precedes(log: Log, arm: Arm, joint: Joint) -> bool:
-    """Whether the motion of a joint is its command of the same period, or of a later one."""
+    """Whether the motion of a joint is its command of the same period, without its noise, or of a later one."""
     part = Part(log, arm.joint_names.index(joint.name))
     size = float(np.sqrt(np.square(part.y).mean()))
 
@@ -205,7 +208,9 @@ def _precedes(log: Log, arm: Arm, joint: Joint) -> bool:
     late, lag = fit_lag(part, lowest=-5), joint.lag
     latency, soonest = (one.delay + one.time_constant / log.period for one in (lag, late))
     at_once = joint.moved and latency < INSTANT and explains(lag, EXACT)
-    return at_once or (soonest < -EARLY and explains(late, EXPLAINED))
+    wanted, motion = (np.diff(signal, 4) for signal in (simulate_lag(part, lag), part.y))
+    noisy = joint.moved and bool(wanted @ motion < FOLLOWED * (wanted @ wanted))
+    return at_once or noisy or (soonest < -EARLY and explains(late, EXPLAINED))
 
 
 def _check_pairs(log: Log, arm: Arm) -> None:

@@ -71,6 +71,8 @@ class Plant(Frozen):
             gap to the commanded velocity. A number, inf for none, one a joint, or a range.
         command_delay: Steps after which a command reaches the drive, which is at rest before. A number or one a
             joint, of which fractions interpolate between two commands; or a range of whole numbers.
+        delay_margin: Steps by which commands may come even later. Simulations leave it out; an evaluation plays each
+            policy at this margin as well, and warns where it loses the path there.
         drive: A drive of low order: v(k) = a₁ v(k-1) + a₂ v(k-2) + a₃ v(k-3) + b₀ u(k) + … + b₃ u(k-3) is the velocity
             in the step k, u the command as it leaves the lag. The numbers (a₁, a₂, a₃, b₀, b₁, b₂, b₃), or such a row a
             joint; they belong to one Δt. None by default.
@@ -108,6 +110,7 @@ class Plant(Frozen):
     load: Drawn = 1.0
     bandwidth: Drawn | PerJoint = math.inf
     command_delay: PerJoint | tuple[int, int] = 0
+    delay_margin: float = 0.0
     drive: tuple[tuple[float, ...], ...] | tuple[float, ...] = ()
     gain: PerJoint = 1.0
     resonance: PerJoint = math.inf
@@ -132,6 +135,7 @@ class Plant(Frozen):
             **{name: whole_number(name, getattr(self, name), at_least=0) for name in ("payload_step", *DELAYS)},
             "bandwidth": checks.frequency("bandwidth", self.bandwidth),
             "command_delay": checks.delay("command_delay", self.command_delay),
+            "delay_margin": number("delay_margin", self.delay_margin, at_least=0.0, at_most=LARGEST),
             "drive": checks.coefficients("drive", self.drive),
             "resonance": checks.resonances("resonance", self.resonance),
             "resonance_damping": checks.damping("resonance_damping", self.resonance_damping),
@@ -173,6 +177,12 @@ class Plant(Frozen):
         driven = known if drives is None else number("drives", drives, at_least=0.0, at_most=LARGEST)
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return self.replace(**severity.knowledge(values, known), **severity.drives(values, driven))
+
+    def at_margin(self) -> Self:
+        """The plant whose commands come later by `delay_margin`; by whole steps where the delay is drawn."""
+        margin = math.ceil(self.delay_margin) if checks.is_range(self.command_delay) else self.delay_margin
+        late: Any = np.add(self.command_delay, margin).tolist()
+        return self.replace(command_delay=late, delay_margin=0.0)
 
     def check(self, arm: Arm, steps: int) -> None:
         """Checks that the plant suits an arm and an episode.

@@ -21,6 +21,7 @@ from ikgym import arms, problems
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.obstacles import Box
+from ikgym.plant import Plant
 from ikgym.plant.identified import IdentifiedPlant
 from ikgym.registry import Registry, import_object
 from ikgym.scenarios import files
@@ -66,8 +67,8 @@ def load(file: str | os.PathLike[str]) -> Scenario:
 
     Args:
         file: A TOML file, as :meth:`Scenario.save` writes it. Paths of other files in it are relative to it. With the
-            key `like`, the name of another scenario, all missing keys are those of that scenario. The key
-        `plant` is a table, or the name of a file that ``ikgym identify`` wrote.
+            key `like`, the name of another scenario, all missing keys are those of that scenario. The key `plant` is a
+            table, or the name of a file that ``ikgym identify`` wrote.
 
     Returns:
         The scenario, checked like one that is made in Python.
@@ -88,6 +89,8 @@ def load(file: str | os.PathLike[str]) -> Scenario:
             return _with_plant(Scenario(**fields), plant)
         if "trajectory" in fields and duration(fields["trajectory"]) is not None:
             fields.setdefault("steps", None)  # those of the new path
+        if plant is not None:
+            fields["plant"] = Plant()  # in place of one that belongs to another Δt or arm
         return _with_plant(base.replace(**fields), plant)
 
 

@@ -41,8 +41,8 @@ class Told(NamedWrapper):
 
     Raises:
         UnknownNameError: There is no such policy, or parameter of it.
-        InvalidInputError: There is no seed where one is needed, a seed is no whole number of at least 0, or the policy
-            is a reference itself.
+        InvalidInputError: There is no seed where one is needed, a seed is no whole number of at least 0, the policy is
+            a reference itself, or the drives have more than delays and lags.
     """
 
     policy: str = "rhc_foresight"
@@ -56,6 +56,11 @@ class Told(NamedWrapper):
 
     def __post_init__(self) -> None:
         scenario = self.scenario
+        if more := [name for name in ("drive", "gain", "resonance") if name in scenario.plant.switched_on()]:
+            raise InvalidInputError(
+                f"plant: expected drives with delays and lags alone, which is all that a policy can be told, got "
+                f"{', '.join(more)}."
+            )
         for name in ("seed", "arm_seed"):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, whole_number(name, value, at_least=0))

@@ -10,6 +10,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import number
+from ikgym import Plant
 from tests.baselines.evaluation.planning import planned
 from tests.baselines.evaluation.test_report import row
 
@@ -83,3 +84,16 @@ def test_tables_show_the_pairs():
     assert "…" in line
     assert "× ideal: its cost divided by that on the ideal plant" in " ".join(text.split())
     assert "× ideal" not in report.table(summarise([one for one in rows if "ideal" not in one.scenario]))
+
+
+def test_policies_that_lose_the_path_at_the_delay_margin_are_named():
+    """A share K of an error is corrected stably below 2 sin(π / (2 (2 d + 1))): 1.0 where d = 1, 0.62 where d = 2."""
+    scenario = ikgym.scenarios.get("panda-circle").replace(plant=Plant(command_delay=1, delay_margin=1.0), steps=600)
+    rows = evaluate(scenario, ["dls:gain=0.8", "dls:gain=0.2"])
+    assert [row.scenario for row in rows] == ["panda-circle"] * 2 + ["panda-circle, later"] * 2
+    assert rows[0].followed
+    assert not rows[2].followed
+    alone = evaluate(scenario.replace(plant=Plant(command_delay=2)), "dls:gain=0.8")
+    assert alone[0].total_cost == rows[2].total_cost
+    (line,) = [line for line in report.remarks(summarise(rows)) if line.startswith("warning")]
+    assert line.startswith("warning: dls:gain=0.8 loses the path of panda-circle where commands come later")

@@ -152,27 +152,48 @@ def test_logs_that_are_refused_say_what_came(log, name, tmp_path):
     assert "\n" not in str(error.value)
 
 
-def test_messages_of_ros_are_the_same_log(log, tmp_path):
+@pytest.mark.parametrize("when", ["before", "during", "after"])
+@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+def test_measured_velocities_with_noise_are_no_commands(log, when, noise):
+    short = log._replace(q=log.q[3000:6000], command=log.command[3000:6000])
+    speed = np.diff(short.q, axis=0) / PERIOD
+    columns = {"before": np.vstack([speed[:1], speed]), "after": np.vstack([speed, speed[-1:]])}
+    columns["during"] = 0.5 * (columns["before"] + columns["after"])
+    measured = columns[when] + noise * np.random.default_rng(0).normal(size=short.q.shape)
+    with pytest.raises(InvalidInputError, match="or have noise that it lacks: these look like measured velocities"):
+        identify(short._replace(command=measured), ARM)
+
+
+def test_fast_drives_are_no_measured_velocities():
+    """The motion follows within a period, and encoders have noise."""
+    log = record(Plant(command_delay=0.4, bandwidth=300.0), 6.0)
+    noise = 1e-5 * np.random.default_rng(0).normal(size=log.q.shape)
+    found = identify(log._replace(q=log.q + noise), ARM)
+    assert all(joint.moved for joint in found.joints)
+    np.testing.assert_allclose([joint.lag.gain for joint in found.joints], 1.0, atol=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["sensor_msgs/msg/JointState", "std_msgs/msg/Float64MultiArray"])
+def test_messages_of_ros_are_the_same_log(log, kind, tmp_path):
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store, short = get_typestore(Stores.ROS2_HUMBLE), log._replace(q=log.q[:2500], command=log.command[:2500])
-    kind, names = "sensor_msgs/msg/JointState", [*ARM.joint_names]
+    state, names = "sensor_msgs/msg/JointState", [*ARM.joint_names]
     header, stamp = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
-    none = np.empty(0)
+    layout, none = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0), np.empty(0)
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        topics = [writer.add_connection(topic, kind, typestore=store) for topic in ("/joint_states", "/arm/command")]
+        topics = {"/joint_states": state, "/arm/command": kind}
+        topics = [writer.add_connection(topic, one, typestore=store) for topic, one in topics.items()]
         for k, (q, command) in enumerate(zip(short.q, short.command, strict=True)):
             head = header(stamp=stamp(sec=0, nanosec=0), frame_id="")
-            for topic, late, position, velocity in ((0, 0, q, none), (1, 200_000, none, command)):
-                message = store.types[kind](
-                    header=head,
-                    name=names[::-1],
-                    position=position[::-1].copy(),
-                    velocity=velocity[::-1].copy(),
-                    effort=none,
-                )
-                raw = store.serialize_cdr(message, kind)
+            sent = {"layout": layout, "data": command}
+            if kind == state:
+                sent = {"header": head, "name": names[::-1], "position": none, "velocity": command[::-1].copy()}
+                sent["effort"] = none
+            seen = {"header": head, "name": names[::-1], "position": q[::-1].copy(), "velocity": none, "effort": none}
+            for topic, late, one, fields in ((0, 0, state, seen), (1, 200_000, kind, sent)):
+                raw = store.serialize_cdr(store.types[one](**fields), one)
                 writer.write(topics[topic], round(1e9 * PERIOD * k) + late, raw)
     (file,) = (tmp_path / "bag").glob("*.mcap")
     found = read(file, ARM)
@@ -211,7 +232,7 @@ def test_the_motion_that_excites_keeps_a_share_of_the_limits_of_jerk(share):
     assert (np.abs(excite(arm, 10.0, 0.001, share)[1]).max(axis=0) > np.abs(command).max(axis=0)).all()
 
 
-def test_the_command_writes_a_plant_that_scenarios_and_controllers_take(log, tmp_path, capsys, monkeypatch):
+def test_the_command_writes_a_plant_that_others_take(log, tmp_path, capsys, monkeypatch, own_registries):
     monkeypatch.setenv("COLUMNS", "120")  # so that no name is broken into two lines
     motion, record_file, plant = (str(tmp_path / name) for name in ("excite.csv", "log.csv", "plant.toml"))
     assert main(["identify", "--excite", "panda", "--seconds", "6", "--out", motion]) == 0
@@ -228,6 +249,10 @@ def test_the_command_writes_a_plant_that_scenarios_and_controllers_take(log, tmp
     scenario = ikgym.scenarios.load(tmp_path / "mine.toml")
     assert scenario.plant == found.plant
     np.testing.assert_allclose(scenario.plant.bandwidth, LAGS.bandwidth, rtol=0.03)
+    ikgym.scenarios.get("panda-circle").replace(plant=Plant(drive=SERVO)).save(tmp_path / "base.toml")
+    ikgym.scenarios.register(ikgym.scenarios.load(tmp_path / "base.toml").replace(name="servo"))
+    (tmp_path / "other.toml").write_text('name = "other"\nlike = "servo"\ndt = 0.002\nplant = "plant.toml"\n')
+    assert ikgym.scenarios.load(tmp_path / "other.toml").plant == found.plant
     controller = baselines.Controller(scenario, drives=plant)
     np.testing.assert_allclose(controller.drives.time_constant, CONSTANTS, rtol=0.03)
     assert dataclasses.replace(found).plant_for(ARM, PERIOD) == found.plant

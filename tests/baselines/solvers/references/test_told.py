@@ -73,5 +73,11 @@ def test_bad_input(parameters, words):
         baselines.make("told", PLAIN, **parameters)
 
 
+def test_drives_that_no_policy_can_be_told_are_refused():
+    scenario = PLAIN.replace(plant=Plant(gain=0.9, resonance=20.0, bandwidth=10.0))
+    with pytest.raises(InvalidInputError, match=r"expected drives with delays and lags alone, .* got gain, resonance"):
+        baselines.make("told", scenario, seed=SEED)
+
+
 def test_on_an_ideal_plant_it_is_the_policy_itself():
     assert np.array_equal(told(Plant()).q, played(Plant(), "rhc", **RHC).q)
