@@ -16,6 +16,14 @@ AROUND = (
     BALL,
     Capsule("pipe", [0.95, -0.3, 0.8], [0.95, 0.3, 0.8], 0.04),
 )
+
+
+def line(way, duration):
+    """A motion from the base frame along a straight line."""
+    return StraightLine([*UPRIGHT, 0, 0, 0], [*UPRIGHT, *way], duration=duration, blend=0.1)
+
+
+PERSON = Capsule("person", [0, 0.5, 0], [0, 0.5, 1], 0.1, motion=line([0.4, -0.3, 0], 0.5))
 POST = Box("post", [0.35, 0.12, 0.2], [0.05, 0.05, 0.7])
 
 
@@ -35,3 +43,10 @@ def ball_in_the_way(arm, q):
 def blocked(steps=1500):
     """The same path with a post where the arm has to pass."""
     return crowd(steps, (AROUND[0], POST), "panda-blocked")
+
+
+def wild(rows, steps):
+    """Actions that lead joints somewhere, one arm another way than the next."""
+    rng = np.random.default_rng(0)
+    drift = rng.uniform(-1, 1, (1, rows, 7))
+    return np.clip(drift + 0.3 * rng.normal(size=(steps, rows, 7)), -1, 1).astype(np.float32)

@@ -6,10 +6,10 @@ import pytest
 
 import ikgym
 from ikgym.kernels.bodies import clearance_rows
+from tests.bodied import AROUND, PERSON, crowd
 from tests.judge import Judge
-from tests.test_collisions import among, person
 
-CROWD = among(person())
+CROWD = crowd(1000, (*AROUND, PERSON))
 NAMES = [*ikgym.scenarios.names("bodies"), CROWD.name]
 #: Steps of all scenarios together; arms side by side; of each step the judge sees so many that are closest, if they are
 #: nearer than a distance in [m].

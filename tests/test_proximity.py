@@ -10,13 +10,12 @@ from baselines.evaluate import evaluate
 from baselines.fingerprints import fingerprint
 from baselines.oracle.episode import EpisodeProblem
 from ikgym.exceptions import InvalidInputError
+from tests.bodied import AROUND, PERSON, crowd, wild
 from tests.comparison import played_alike
-from tests.test_collisions import among, person, vectors_of, wild
 
-# Two bodies of the arm are always 15 mm apart.
 NEAR = ikgym.ProximityCost(0.014, 0.005, 3.0, 1.5)
 PLANT = ikgym.Plant(zero=0.01, link=1e-3, payload=0.02, payload_step=60, command_delay=2)
-CROWD = among(person()).replace(iterations_per_point=2, plant=PLANT)
+CROWD = crowd(1000, (*AROUND, PERSON)).replace(iterations_per_point=2, plant=PLANT)
 
 
 def depth_cost(clearance):
@@ -26,7 +25,12 @@ def depth_cost(clearance):
 
 
 def test_one_arm_many_in_a_loop_and_many_at_once_pay_what_the_formula_says():
-    returned, paid = played_alike(*vectors_of(CROWD.replace(proximity=NEAR)), wild(5, 200)), []
+    scenario = CROWD.replace(proximity=NEAR)
+    envs = [
+        gym.make_vec("RedundantIK-v0", num_envs=5, scenario=scenario, vectorization_mode=mode)
+        for mode in ("vector_entry_point", "sync")
+    ]
+    returned, paid = played_alike(*envs, wild(5, 300)), []
     for k, (_, rewards, _, _, infos) in enumerate(returned, start=1):
         expected = [depth_cost(one) if k % 2 == 0 else 0.0 for one in infos["clearance"]]
         np.testing.assert_allclose(infos["proximity_cost"], expected, rtol=1e-12)
@@ -43,12 +47,13 @@ def test_it_changes_nothing_but_the_cost():
     for one in (CROWD, CROWD.replace(proximity=NEAR)):
         env = gym.make("RedundantIK-v0", scenario=one)
         env.reset(seed=2)
-        played = [env.step(action) for action in wild(1, 100)[:, 0]]
+        played = [env.step(action) for action in wild(5, 300)[:, 2]]
         results.append(
             [(seen["q"].tolist(), info["tracking_cost"], info["velocity_cost"]) for seen, *_, info in played]
         )
         assert all(("proximity_cost" in info) is (one.proximity is not None) for *_, info in played)
     assert results[0] == results[1]
+    assert max(info["proximity_cost"] for *_, info in played) > 0.0
 
 
 def test_rows_and_trajectories_have_it():
