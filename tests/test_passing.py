@@ -40,7 +40,7 @@ def check(scenario, count):
     while moved < count:
         ways, places, clearances = walk.some_steps()
         moved, stops = moved + walk.moved, stops + walk.stopped.sum()
-        distances = judge(tenths(*ways), tenths(*places) if len(places[0]) > 1 else places[0])
+        distances = judge(tenths(*ways), tenths(*places))
         np.testing.assert_allclose(distances[-len(clearances) :], clearances, atol=2e-6)
         lowest = min(lowest, distances.min(initial=np.inf))
         walk.begin_again()
