@@ -20,6 +20,9 @@ from tests.arms.test_urdf import LIMIT
 from tests.arms.test_urdf import joint as bare
 
 PANDA = Path(__file__).parents[1] / "robots" / "panda_hand.urdf"
+#: Arms, alone and on bases, in example-robot-data; without `xarm_description`, which is always tested.
+KINDS = ("baxter", "centauro", "kinova", "panda", "pr2", "so_arm", "tiago", "tiago_pro", "ur", "z1")
+ARMS = ("talos_data", *(f"{kind}_description" for kind in KINDS))
 
 
 def shape(geometry, xyz="0 0 0", rpy="0 0 0"):
@@ -282,26 +285,19 @@ def test_a_fine_mesh_is_covered_in_no_time():
     assert capsule.radius < 0.31
 
 
-@pytest.mark.slow
-def test_capsules_contain_the_meshes_of_public_robots():
+@pytest.mark.parametrize("robot", ["xarm_description", *(pytest.param(name, marks=pytest.mark.slow) for name in ARMS)])
+def test_capsules_contain_the_meshes_of_public_arms(robot):
+    """All of them, those that are only shown too."""
     cmeel = pytest.importorskip("cmeel")
-    folder = Path(cmeel.__file__).parents[1] / "cmeel.prefix/share/example-robot-data/robots"
-    if not folder.is_dir():
+    folder = Path(cmeel.__file__).parents[1] / "cmeel.prefix/share/example-robot-data/robots" / robot
+    if not folder.parent.is_dir():
         pytest.skip("example-robot-data is not installed")
-    seen = 0
-    for name in ("panda_description", "ur_description", "kinova_description", "xarm_description", "tiago_description"):
-        for file in sorted(folder.glob(f"{name}/meshes/**/*.*")):
-            if file.suffix.lower() not in geometry.MESHES:
-                continue
-            try:
-                vertices = np.array(trimesh.load_mesh(file, process=False).vertices)
-                solid = geometry._mesh("link", xml_of(f'<mesh filename="{file}"/>'), [folder])
-            except (InvalidInputError, AttributeError, ValueError):
-                continue  # a damaged file, or one of points alone
-            (capsule,) = solid.capsules
-            assert (distances(vertices, capsule.start, capsule.end) - capsule.radius).max() < 1e-4, file
-            seen += 1
-    assert seen > 50
+    files = [file for file in folder.rglob("*") if file.suffix.lower() in geometry.MESHES]
+    assert files
+    for file in files:
+        vertices = trimesh.load_mesh(file, process=False).vertices
+        (capsule,) = geometry._mesh("link", xml_of(f'<mesh filename="{file}"/>'), [folder]).capsules
+        assert (distances(np.array(vertices), capsule.start, capsule.end) - capsule.radius).max() < 1e-4, file
 
 
 def test_more_shapes_than_an_arm_may_have_are_refused(write):
