@@ -72,14 +72,16 @@ def message(episode: Episode, accelerations: bool = False) -> dict[str, Any]:
 
     From rest at the start to rest at the end, see :func:`baselines.evaluation.motion.spline.stop`, with the velocities
     of a cubic spline, see :func:`baselines.evaluation.motion.spline.smooth`. Controllers interpolate cubically between
-    points without accelerations, else by quintics.
+    points without accelerations, else by quintics. Where the scenario limits jerk, accelerations are continuous, and
+    both are the same curve.
 
     Raises:
         InvalidInputError: The episode ends in motion, and has no room to stop.
     """
     scenario = episode.scenario
-    q = stop(scenario.arm, Motion.of(episode).q, scenario.dt)
-    points = smooth(q, scenario.dt)
+    jerk = scenario.jerk_limit if np.isfinite(scenario.jerk_limit).any() else None
+    q = stop(scenario.arm, Motion.of(episode).q, scenario.dt, jerk)
+    points = smooth(q, scenario.dt, jerk=jerk is not None)
     times = scenario.dt * np.arange(len(points.q))
     return {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},

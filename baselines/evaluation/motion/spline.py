@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from baselines.solvers.quadratic_program.velocity_box import stopping_change
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.validation import FloatArray
@@ -37,7 +38,7 @@ class Points(NamedTuple):
     qddot: FloatArray
 
 
-def smooth(q: FloatArray, dt: float) -> Points:
+def smooth(q: FloatArray, dt: float, *, jerk: bool = False) -> Points:
     """Points between which a cubic Hermite spline accelerates at most 1.1 times as hard as the motion.
 
     The first of these that does: points through the coordinates themselves, which suit gradual accelerations; points of
@@ -47,13 +48,19 @@ def smooth(q: FloatArray, dt: float) -> Points:
     Args:
         q: Joint coordinates, one row a period, from rest; the last two are equal. Shape (k, n).
         dt: The period in [s].
+        jerk: Whether jerk is limited: then the last of them. A cubic B-spline has continuous accelerations, also at
+            both ends, and at each time keeps the limits of velocity, acceleration and jerk that its control points keep
+            from step to step.
     """
+    waited = _points(np.vstack([q[:1], q]), dt, smoothed=True)
+    if jerk:
+        return waited
     played = np.abs(np.diff(q, 2, axis=0, prepend=q[:1])).max(axis=0) / dt**2
     most = EXCESS * np.maximum(played, FLOOR * played.max())
     for points in (_points(q, dt), _points(q, dt, smoothed=True), _points(q + from_rest(q), dt, smoothed=True)):
         if (accelerations(points, dt) <= most).all():
             return points
-    return _points(np.vstack([q[:1], q]), dt, smoothed=True)
+    return waited
 
 
 def from_rest(q: FloatArray) -> FloatArray:
@@ -98,8 +105,10 @@ def _progress(count: int) -> FloatArray:
     return np.minimum(np.arange(count) / max(1, min(CATCH_UP, count - 2)), 1.0)
 
 
-def stop(arm: Arm, q: FloatArray, dt: float) -> FloatArray:
+def stop(arm: Arm, q: FloatArray, dt: float, jerk_limit: FloatArray | None = None) -> FloatArray:
     """A motion that begins at rest, continued until it is at rest.
+
+    With a limited jerk each joint stops as fast as it can. Without:
 
     All joints slow down together, along the line on which they move at the end, with accelerations that begin and end
     at 0. None slows down harder than it has accelerated before: a motion within acceleration limits stays there.
@@ -108,6 +117,7 @@ def stop(arm: Arm, q: FloatArray, dt: float) -> FloatArray:
         arm: The arm.
         q: Joint coordinates, one row a period, in [rad] or [m]. Shape (k, n).
         dt: The period in [s].
+        jerk_limit: In [rad/s³] or [m/s³], inf where there is none. Shape (n,).
 
     Returns:
         The coordinates, followed by those of the stop; the last two rows are equal.
@@ -119,13 +129,31 @@ def stop(arm: Arm, q: FloatArray, dt: float) -> FloatArray:
     last = qdot[-1]
     if not last.any():
         return q
+    if jerk_limit is not None:
+        slowing = _slowing(qdot, dt * arm.acceleration_limit, dt * dt * jerk_limit)
+        return _stopped(arm, q, dt, slowing)
     hardest = np.abs(np.diff(qdot, axis=0, prepend=np.zeros_like(q[:1]))).max(axis=0) / dt
     moving = last != 0.0
     periods = max(FEWEST, math.ceil(STEEPEST * (np.abs(last[moving]) / hardest[moving]).max() / dt))
     u = np.arange(1, periods + 1) / periods
     slowing = np.outer(1.0 - u**2 * (3.0 - 2.0 * u), last)
+    return _stopped(arm, q, dt, slowing)
+
+
+def _slowing(qdot: FloatArray, most: FloatArray, steps: FloatArray) -> FloatArray:
+    """Velocities of the fastest stop, see :func:`stopping_change`, until all are 0. Shape (k, n)."""
+    velocity, change, out = qdot[-1].copy(), qdot[-1] - qdot[-2], []
+    while velocity.any():
+        for j in range(len(velocity)):
+            change[j] = stopping_change(velocity[j], change[j], most[j], steps[j])
+        velocity += change
+        out.append(velocity.copy())
+    return np.array(out)
+
+
+def _stopped(arm: Arm, q: FloatArray, dt: float, slowing: FloatArray) -> FloatArray:
     out = np.vstack([q, q[-1] + dt * np.cumsum(slowing, axis=0)])
-    _check(arm, out[-1], last)
+    _check(arm, out[-1], (q[-1] - q[-2]) / dt)
     return out
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import re
 
 import numpy as np
 import pytest
+from numpy import polynomial
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
@@ -79,6 +81,51 @@ def test_joint_trajectory_starts_and_ends_at_rest_on_time(tmp_path):
     np.testing.assert_allclose(seconds, 0.3 * np.arange(len(points)), atol=1e-9)
     track.to_joint_trajectory(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text(encoding="utf-8") == text
+
+
+def interpolated(points, dt, accelerations, samples=10):
+    """Velocities, accelerations and jerks of cubic or quintic polynomials between points, as controllers make them."""
+    data = [np.array([point[key] for point in points]) for key in ("positions", "velocities", "accelerations")]
+    data = data[: 3 if accelerations else 2]
+    k, out = len(data), []
+    powers = [polynomial.Polynomial.basis(i) for i in range(2 * k)]
+    system = [[p.deriv(i)(t) if i else p(t) for p in powers] for t in (0.0, dt) for i in range(k)]
+    values = np.concatenate([np.stack([each[:-1] for each in data]), np.stack([each[1:] for each in data])])
+    coefficients = np.linalg.solve(system, values.reshape(2 * k, -1))
+    times = dt * np.linspace(0.0, 1.0, samples + 1)  # both ends of each piece
+    for i in (1, 2, 3):
+        basis = np.array([p.deriv(i)(times) for p in powers])
+        found = (basis.T @ coefficients).reshape(len(times), *values.shape[1:])
+        out.append(found.transpose(1, 0, 2))
+    return out
+
+
+@pytest.mark.parametrize("accelerations", [False, True])
+def test_exports_keep_the_limits_of_jerk_between_samples(accelerations, tmp_path):
+    """At 10 kHz, from rest to rest, with continuous accelerations; without limits of jerk they jump."""
+    scenario = ikgym.scenarios.get("panda-line")
+    law = dataclasses.replace(scenario.trajectory.time_law, speed=0.8, acceleration=6.0)
+    scenario, jumps = scenario.replace(trajectory=scenario.trajectory.replace(time_law=law), steps=None), []
+    arm = scenario.arm
+    for limit in (None, np.inf):
+        track = baselines.track(scenario.replace(jerk_limit=limit), "qp")
+        track.to_joint_trajectory(tmp_path / "motion.json", accelerations=accelerations)
+        points = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))["points"]
+        velocity, acceleration, jerk = interpolated(points, scenario.dt, accelerations)
+        before = np.concatenate([np.zeros((1, 7)), acceleration[:, -1]])
+        jumps.append(np.abs(np.concatenate([acceleration[:, 0], np.zeros((1, 7))]) - before).max())
+        if limit is None:
+            assert np.abs(velocity[[0, -1], [0, -1]]).max() < 1e-9
+            for values, most in (
+                (velocity, arm.velocity_limit),
+                (acceleration, arm.acceleration_limit),
+                (jerk, arm.jerk_limit),
+            ):
+                share = (np.abs(values) / most).max()
+                assert share <= 1.0 + 1e-4
+            assert share > 0.5
+    assert jumps[0] < 1e-3
+    assert jumps[1] > 1.0
 
 
 def test_mcap_is_read_without_ros_and_holds_the_same_message(tmp_path, monkeypatch):
