@@ -52,6 +52,7 @@ def test_from_rest_to_rest():
         for near, nearer in [(path[3] - path[0], path[2] - path[0]), (path[4] - path[-1], path[5] - path[-1])]:
             np.testing.assert_allclose(near, 8 * nearer, rtol=1e-6, atol=1e-13)
         assert np.abs(path[1] - path[-1]).max() > 1e-3
+        assert (np.abs(path) <= RANDOM.joint_bound()).all()
 
 
 def test_motions_fill_the_range():
