@@ -121,7 +121,7 @@ def printed(scenario, q, nominal, rule, numbers, *, jacobians, stop, tolerance, 
         ("khan8-q1", 1, "predicted", "horizon", 0.1),
         ("varga7-fast", 2, "predicted", "horizon", 0.02),
         ("zhang3-helix", 3, "constant", "horizon", 0.02),
-        ("zhang6-lspb", 3, "predicted", "first_point", 0.02),
+        ("zhang6-lspb", 5, "predicted", "first_point", 0.2),
         ("khan8-q1", 5, "predicted", "horizon", 0.02),
     ],
 )
