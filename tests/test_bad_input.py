@@ -386,7 +386,7 @@ REFUSED = [
         ("resonance", 0.0), ("resonance", (1, -2, 3)), ("resonance", [[1.0, 2.0], [3.0]]), ("resonance", ()),
         *((name, ()) for name in ("bandwidth", "command_delay", "gain", "resonance_damping")),
         ("resonance_damping", 1.0), ("drive", (1, 0, 0)), ("drive", (1.1, 0, 0, 1, 0, 0, 0)),
-        ("command_delay", (12, 2)), ("command_delay", (1.5, 2)),
+        ("command_delay", (12, 2)), ("command_delay", (1.5, 2)), ("delay_margin", -1.0), ("delay_margin", (1, 2)),
         ("q_delay", 0.5), ("pose_every", 0), ("pose_every", (0, 2)), ("pose_noise", (2, 1)), ("calibration", -1.0),
         ("from_middle", (0.5, 0.5)), ("from_middle", 0.5), ("from_middle", (0, 2)), ("pose_missing", 1.01),
         ("arms", "panda-2"), ("arms", ("panda-2",)),

@@ -130,7 +130,7 @@ def remarks(lines: pd.DataFrame, skipped: Sequence[Skipped] = ()) -> list[str]:
     known = {(one.scenario, one.label, one.text): one.position_error_mm for one in lines.itertuples()}
     warnings = [
         f"warning: {label} loses the path of {scenario} where commands come later by the delay margin of its plant: "
-        f"{later:.3g} mm instead of {error:.3g} mm; on the arm that was identified it may, too"
+        f"{later:.3g} mm instead of {error:.3g} mm; it may on the real arm, too"
         for (scenario, label, text), error in known.items()
         if (later := known.get((scenario + AT_MARGIN, label, text))) is not None
         and lacks_margin(1e-3 * error, 1e-3 * later)
