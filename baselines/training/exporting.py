@@ -80,7 +80,7 @@ def agent_of_model(model: BaseAlgorithm, envs: LearningVecEnv, training: Mapping
     if sizes != needed:
         raise InvalidInputError(
             f"model: expected a network from {needed[0]} features to {needed[1]} outputs, got {sizes[0]} and "
-            f"{sizes[1]}; agents see no history, no commands and no ages of measurements."
+            f"{sizes[1]}; agents see no history, no inverse, no commands and no ages."
         )
     _check_actions(model, network)
     return agent_of(network, processing, scenario, training)

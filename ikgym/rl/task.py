@@ -32,6 +32,8 @@ class Task(Frozen):
     | n | joint velocities last applied, as shares of the largest |
     | 2 w each | position and orientation error to the reference at each step ahead that is shown, in units of \
 `coarse`, then the hyperbolic tangent of the same in units of `fine`; 1 rad counts as `radian` |
+    | n each | with `inverse`, joint velocities that reach the reference at each step ahead in time, by damped least \
+squares of the model, as shares of the largest |
     | 1 each | ages of `q` and `pose` in units of ten steps, where sensors are slow or late |
     | h n | the last h commands, as shares of the largest joint velocities |
     | c | the context of the episode, from -1 to 1, with `context` |
@@ -63,6 +65,7 @@ class Task(Frozen):
         coarse: Unit of errors in the observation, in [m], above 0.
         fine: Unit of the hyperbolic tangent of the same, in [m], above 0.
         counted: Steps at the end of an episode that are rewarded and scored; None for all.
+        inverse: Whether the observation has joint velocities of the model's damped inverse Jacobian.
         context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
 
     Raises:
@@ -81,6 +84,7 @@ class Task(Frozen):
     coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
+    inverse: bool = False
     context: bool = False
 
     def __post_init__(self) -> None:
@@ -88,6 +92,7 @@ class Task(Frozen):
         if self.counted is not None:
             whole_number("counted", self.counted, at_least=1)
         whole_number("steepness", self.steepness, at_least=1, at_most=2)
+        flag("inverse", self.inverse)
         flag("context", self.context)
         for name in ("share", "radian", "half", "coarse", "fine"):
             number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)

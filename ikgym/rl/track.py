@@ -19,6 +19,8 @@ from ikgym.validation import BoolArray, FloatArray, shortened
 
 #: Error in [m] that costs 1: Δx of the cost.
 UNIT = 1e-3
+#: λ of the damped inverse Jacobian that is shown, as of `dls`.
+DAMPING = 1e-3
 #: Steps that count as 1 in ages of measurements.
 OLDEST = 10.0
 #: Observations of N rows, or of one without a row axis.
@@ -48,8 +50,14 @@ class Learner:
         self._command = kind, scenario.model.chain, scales, *joint_scales(scenario.model), self._fastest
         self._more = [key for key in ("q_age", "pose_age", "commands") if key in space.spaces]
         self._size = 2 * (scenario.joints + len(preview) * int(twist_size(kind)))
+        self._scenario, self._ahead = scenario, preview if task.inverse else ()
         self._contexts = len(scenario.plant.context) if task.context else 0
-        size = self._size + spaces.flatdim(spaces.Dict({key: space[key] for key in self._more})) + self._contexts
+        size = (
+            self._size
+            + len(self._ahead) * scenario.joints
+            + spaces.flatdim(spaces.Dict({key: space[key] for key in self._more}))
+            + self._contexts
+        )
         self.observation_space = spaces.Box(-MOST, MOST, (task.history * size,), np.float32)
         self._history, self._context = np.zeros((rows or 1, task.history, size), np.float32), np.zeros((rows or 1, 0))
         self._fraction = task.share * self._fastest / scenario.velocity_limit
@@ -117,7 +125,21 @@ class Learner:
         model = np.empty((rows, self._size))
         track_rows(*self._command, *(seen[key] for key in ("q", "qdot", "pose", "nominal")), model)
         more = [self._scale(key, seen[key]).reshape(rows, -1) for key in self._more]
-        return np.concatenate([model, *more, context], axis=1).astype(np.float32)
+        return np.concatenate([model, *self._inverse(seen), *more, context], axis=1).astype(np.float32)
+
+    def _inverse(self, seen: dict[str, FloatArray]) -> list[FloatArray]:
+        """Joint velocities that reach each reference in time, as shares of the largest. Shapes (N, n)."""
+        if not self._ahead:
+            return []
+        arm, task, q = self._scenario.model, self._scenario.task, seen["q"]
+        jacobian = task.jacobian(arm.forward(q)[0], arm.jacobian(q))
+        transposed = np.swapaxes(jacobian, 1, 2)
+        gram, out = jacobian @ transposed + DAMPING * np.eye(task.error_size), []
+        for i, steps in enumerate(self._ahead):
+            error = task.error(seen["nominal"][:, i], seen["pose"])[..., None]
+            shift = (transposed @ np.linalg.solve(gram, error))[..., 0]
+            out.append(np.clip(shift / (steps * self._scenario.dt * self._fastest), -MOST, MOST))
+        return out
 
     def _scale(self, key: str, value: FloatArray) -> FloatArray:
         """Past commands as shares of the largest joint velocities, ages in units of ten steps."""

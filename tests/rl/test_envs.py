@@ -1,10 +1,12 @@
 """Environments for learning: what they show and reward, and one arm against N, bit for bit."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import RecordVideo as RecordVideos
 
+import baselines
 import ikgym
 import ikgym.sb3
 from ikgym import rl
@@ -32,6 +34,7 @@ def context(seed):
         rl.Task(short(), lost_distance=0.12, share=0.02, history=2, commands=2),
         rl.Task(short("panda-camera-slow"), lost_distance=0.0003, history=2, commands=2),
         rl.Task(CONTEXT, lost_distance=None, context=True, counted=3),
+        rl.Task(short("learning-track"), lost_distance=0.03, inverse=True, history=2),
     ],
     ids=lambda task: task.scenario.name,
 )
@@ -82,6 +85,21 @@ def test_what_an_arm_sees_of_a_task(name, task):
     np.testing.assert_allclose(features[2 * arm.joints :].reshape(2, -1)[1], np.tanh(units / 5.0), atol=1e-5)
     cost = info["tracking_cost"] + info["velocity_cost"]
     assert reward == pytest.approx(1.0 / (1.0 + cost / 50e3**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["varga7-random", "tiago-turn", "learning-track"])
+def test_the_inverse_is_that_of_damped_least_squares(name):
+    """It is the velocity of `dls` in the first step, when no reference before is known."""
+    scenario = ikgym.scenarios.get(name)
+    env, bare = rl.make(scenario, ahead=(scenario.dt, 3.0 * scenario.dt), inverse=True), rl.make(scenario)
+    (seen, _), (less, _) = env.reset(seed=1), bare.reset(seed=1)
+    n, fastest = scenario.joints, scenario.largest_qdot
+    for i, steps in ((0, 1), (1, 3)):
+        plain = gym.make("RedundantIK-v0", scenario=scenario, preview=(steps,))
+        action, _ = baselines.make("dls", scenario).predict(plain.reset(seed=1)[0])
+        expected = np.clip(action * scenario.velocity_limit / (steps * fastest), -5.0, 5.0)
+        shown = seen[len(less) + i * n : len(less) + (i + 1) * n]
+        np.testing.assert_allclose(shown, expected, rtol=1e-4, atol=1e-6)
 
 
 def test_joints_are_seen_from_home_or_the_middle_of_their_range():
