@@ -5,6 +5,7 @@ import pytest
 
 import ikgym
 from baselines.controller import ArmInterface, Controller, Drives, MockArm, Reflex
+from docs import reflexes
 from docs.reflexes import drive, scenario_of
 from ikgym.exceptions import InvalidInputError
 from ikgym.plant import Plant
@@ -111,6 +112,22 @@ def test_the_loop_starts_no_reflex_with_a_limit_of_jerk(arm):
     assert run.stopped == ""
     assert run.largest < 1e-3
     assert drive(scenario, 3, 1.5, jerk=False).stopped == "jerk"
+
+
+def test_a_measurement_that_was_killed_continues(tmp_path, monkeypatch):
+    line = {"arm": "panda", "path": "circle", "runs": "1", "seconds": "1.2"}
+    table = [line | {"jerk": "limited"}, line | {"jerk": "free"}]
+    monkeypatch.setattr(reflexes, "WORK", tmp_path)
+    monkeypatch.setattr(reflexes, "lines", lambda _: table)
+    first, second = reflexes.measured()
+    assert (first["stopped"], second["stopped"], second["by"]) == (0, 1, "jerk")
+    assert 0.0 < first["error_rms_mm"] < first["error_max_mm"] < 1.0
+    made = []
+    monkeypatch.setattr(reflexes, "drive", lambda *_, jerk: made.append(jerk) or reflexes.Run(0.1, "velocity"))
+    table[1]["runs"] = "2"
+    again = reflexes.measured()
+    assert (made, again[0]) == ([False], first)
+    assert (again[1]["stopped"], again[1]["by"]) == (2, "jerk velocity")
 
 
 @pytest.mark.slow
