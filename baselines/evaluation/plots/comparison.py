@@ -30,6 +30,11 @@ NUMBERS = ("cost_ratio", "low", "high", "time_p99_us", "foresight", "episodes", 
 EXCESS = "cost above the reference [%]"
 
 
+def front(lines: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The lines of the Pareto front, see :func:`cost_time`, fast to slow."""
+    return [lines[place] for place in _front(_frame(lines)).index]
+
+
 def cost_time(lines: Lines, title: str) -> Figure:
     """Excess cost against the 99th percentile of the time per call, with intervals and the Pareto front.
 
