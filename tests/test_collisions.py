@@ -72,12 +72,15 @@ def test_without_collisions_nothing_is_stopped_and_costs_are_the_same():
     assert rewards[0] == rewards[1] == rewards[2]
 
 
-def test_a_learner_is_ended_by_a_collision():
+def test_learners_are_ended_by_a_collision():
     env = gym.make("RedundantIK-v0", scenario=CROWD, lost_distance=5.0)
+    envs = ikgym.RedundantIKVectorEnv(2, CROWD, lost_distance=5.0)
     env.reset(seed=1)
+    envs.reset(seed=1)
     for _ in range(CROWD.steps):
         _, _, terminated, _, info = env.step(DOWN)
         assert terminated == info["collision"]
+        assert envs.step(np.stack([DOWN] * 2))[2].tolist() == [terminated] * 2
         if terminated:
             break
     assert terminated
