@@ -53,7 +53,7 @@ class Problem(Frozen):
 
     def __post_init__(self) -> None:
         self._settle(velocity_limit=frozen_array("velocity_limit", self.velocity_limit, (self.model.joints,)))
-        if self.jerk_limit is not None:
+        if self.jerk_limit is not None and np.isfinite(self.jerk_limit).any():
             self._check_jerk(self.jerk_limit)
 
     def _check_jerk(self, jerk_limit: FloatArray) -> None:
