@@ -115,7 +115,7 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50}
     alone = evaluate(**given)
     monkeypatch.setattr(playing, "BLOCK", 1)
-    monkeypatch.setattr(playing, "finished", lambda function, *given: finished(work, *given))
+    monkeypatch.setattr("baselines.workers.finished", lambda function, *given: finished(work, *given))
     monkeypatch.setattr(playing, "_check_versions", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
