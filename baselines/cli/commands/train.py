@@ -111,7 +111,7 @@ Examples:
 Files of a run by rewards, all but apg, in seed-N:
   model.zip          the model, for its library
   agent.safetensors  the agent, for: {evaluate} --policies agent:FILE; none with a history or an LSTM
-  curve.csv          CPU seconds, steps, and score on validation episodes: 0 standing still, 1 tuned dls
+  curve.csv          CPU seconds, steps, and score on validation episodes: 0 standing still, 1 the best tuned solver
   run.json           at the end: settings, seed and final score
 
 Files of a run of apg, which may be killed at any time:

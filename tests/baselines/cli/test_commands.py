@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +12,6 @@ import ikgym
 from baselines import cli
 from baselines.cli import main
 from tests.bodied import crowd
-
-ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)

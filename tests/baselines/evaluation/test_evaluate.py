@@ -1,7 +1,6 @@
 import csv
 import dataclasses
 import json
-import pathlib
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from baselines.registry import parse_policy
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.baselines.evaluation.planning import planned
 
-ROOT = pathlib.Path(__file__).parents[3]
 STEPS = 15
 SET = {"test_sets": "varga7-random"}
 FAST = ikgym.scenarios.get("varga7-fast")
