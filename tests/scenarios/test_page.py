@@ -44,6 +44,13 @@ def test_the_table_of_keys_is_complete():
             assert float(default) == fields[key].default
 
 
+def test_the_plant_is_read(tmp_path):
+    (tmp_path / "x.toml").write_text(WHOLE + PLANT, encoding="utf-8")
+    plant = ikgym.scenarios.load(tmp_path / "x.toml").plant
+    for name, value in tomllib.loads(PLANT)["plant"].items():
+        np.testing.assert_array_equal(getattr(plant, name), value)
+
+
 def test_the_arm_from_a_urdf_is_read(tmp_path):
     arm = tomllib.loads(ON_URDF)["arm"]
     for folder in ("robots", arm["packages"][0]):
