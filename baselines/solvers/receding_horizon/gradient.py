@@ -137,7 +137,7 @@ class RecedingHorizonGradient(SolverPolicy):
             alpha_factor=self.alpha_factor,
             difference=self.difference if self.gradient == "finite_difference" else 0.0,
         )
-        return HorizonModel(*self.problem.kernel_model, self.weights), settings
+        return HorizonModel(self.problem.kernel_model, self.weights), settings
 
     def _descend(self) -> Any:
         """The kernel of the descent."""
@@ -182,6 +182,6 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
             take_step(qdot, alpha[row], gradient)
             step += 1
         iterations[row] = step
-        status[row] = stop_if_diverged(status[row], value, first_value, data.limits[FASTEST], qdot)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.model.limits[FASTEST], qdot)
         if status[row] == DIVERGED:
             alpha[row] = settings.alpha_min

@@ -10,35 +10,31 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from baselines.policy_kernels import Model
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import inlined, inner, kernel
-from ikgym.kernels.kinematics import Chain, forward, forward_and_jacobian
+from ikgym.kernels.kinematics import forward, forward_and_jacobian
 
 Floats = npt.NDArray[np.float64]
 
 
 class HorizonModel(NamedTuple):
-    """A :class:`baselines.policy_kernels.Model`, and the weights of its joints.
+    """The model that all kernels see, and the weights of its joints.
 
-    Attributes, besides those of the model:
+    Attributes:
+        model: See :class:`baselines.policy_kernels.Model`.
         joint_weights: Factors of the velocity costs of the joints. Shape (n,).
     """
 
-    chain: Chain
-    kind: int
-    cost: CostParameters
-    dt: float
-    velocity_limit: Floats
-    limits: Floats
+    model: Model
     joint_weights: Floats
 
 
 @kernel
 def velocity_cost(data, qdot):
     """Φ^U of one step with the weights of a :class:`HorizonModel`. Shape of ``qdot`` (n,)."""
-    cost, weights, total = data.cost, data.joint_weights, 0.0
+    cost, weights, total = data.model.cost, data.joint_weights, 0.0
     for j in range(qdot.shape[0]):
         total += weights[j] * cost_kernels.value(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
     return total
@@ -47,7 +43,7 @@ def velocity_cost(data, qdot):
 @kernel
 def velocity_gradient(data, qdot, out):
     """Its derivative by q̇. Shapes (n,)."""
-    cost, weights = data.cost, data.joint_weights
+    cost, weights = data.model.cost, data.joint_weights
     for j in range(qdot.shape[0]):
         out[j] = weights[j] * cost_kernels.gradient(qdot[j], cost.delta_qdot, cost.p_in, cost.p_out)
 
@@ -68,7 +64,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
         The cost.
     """
     steps, n = qdot.shape
-    workspace = frame_workspace(data.kind, nominal)
+    workspace = frame_workspace(data.model.kind, nominal)
     stages, shifted = np.empty(steps), np.empty(steps)
     total = _roll(data, q.copy(), nominal, qdot, 0, stages, workspace)
     start, here = q.copy(), np.empty(n)
@@ -83,7 +79,7 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
             gradient[i, j] = (moved - total) / delta
             qdot[i, j] = kept
         for j in range(n):
-            start[j] += data.dt * qdot[i, j]
+            start[j] += data.model.dt * qdot[i, j]
         before += stages[i]
     return total
 
@@ -91,10 +87,10 @@ def difference_gradient(data, q, nominal, qdot, delta, gradient):
 @inner
 def _roll(data, here, nominal, qdot, first, stages, workspace):
     """Goes from ``here`` through the stages from ``first`` on, and sums their costs, which ``stages`` receives."""
-    cost, error, total = data.cost, workspace[3], 0.0
+    cost, error, total = data.model.cost, workspace[3], 0.0
     for i in range(first, qdot.shape[0]):
         for j in range(here.shape[0]):
-            here[j] += data.dt * qdot[i, j]  # eq. 5
+            here[j] += data.model.dt * qdot[i, j]  # eq. 5
         tracking_error(data, nominal[i], here, workspace, error)
         stages[i] = cost_kernels.tracking(cost, error) + velocity_cost(data, qdot[i])
         total += stages[i]
@@ -105,9 +101,9 @@ def _roll(data, here, nominal, qdot, first, stages, workspace):
 def tracking_error(data, nominal, q, workspace, error):
     """The tracking error of one grid point: shapes (m,), (n,), a :func:`frame_workspace`, (e,)."""
     rotation, position, pose, _ = workspace
-    forward(data.chain, q, rotation, position)
-    task_kernels.coordinates(data.kind, rotation, position, pose)
-    task_kernels.error(data.kind, nominal, pose, error)
+    forward(data.model.chain, q, rotation, position)
+    task_kernels.coordinates(data.model.kind, rotation, position, pose)
+    task_kernels.error(data.model.kind, nominal, pose, error)
 
 
 @inner
@@ -120,7 +116,7 @@ def frame_workspace(kind, nominal):
 @inner
 def analytic_gradient(data, q, nominal, qdot, gradient):
     """∂Φ/∂q̇ by the chain rule, and Φ; arguments as in :func:`difference_gradient`."""
-    (steps, n), dt = qdot.shape, data.dt
+    (steps, n), dt = qdot.shape, data.model.dt
     states, by_q = np.empty((steps, n)), np.empty((steps, n))
     roll_out(dt, q, qdot, states)
     total = analytic_state_gradient(data, nominal, states, qdot, by_q, gradient)
@@ -148,7 +144,7 @@ def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     ``q`` are the joint coordinates at the second and later grid points; all arrays have the shape (HL - 1, n).
     """
     steps, n = q.shape
-    chain, workspace = data.chain, gradient_workspace(data.kind, nominal, n)
+    chain, workspace = data.model.chain, gradient_workspace(data.model.kind, nominal, n)
     rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     total = 0.0
     for i in range(steps):
@@ -167,7 +163,7 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     velocity and by the states that it moves, up to rounding.
     """
     steps, n = q.shape
-    cost, dt, workspace, total = data.cost, data.dt, frame_workspace(data.kind, nominal), 0.0
+    cost, dt, workspace, total = data.model.cost, data.model.dt, frame_workspace(data.model.kind, nominal), 0.0
     error = workspace[3]
     for i in range(steps):
         tracking_error(data, nominal[i], q[i], workspace, error)
@@ -227,10 +223,10 @@ def linearise(kind, nominal, workspace):
 def _tracking_gradient(data, nominal, workspace, gradient):
     """Φ^X of one grid point, and its derivative by the joint coordinates there, which ``gradient`` (n,) receives."""
     error, by_error, error_jacobian = workspace.error, workspace.gradient, workspace.error_jacobian
-    linearise(data.kind, nominal, workspace)
-    cost_kernels.tracking_gradient(data.cost, error, by_error)
+    linearise(data.model.kind, nominal, workspace)
+    cost_kernels.tracking_gradient(data.model.cost, error, by_error)
     for j in range(gradient.shape[0]):
         gradient[j] = 0.0
         for k in range(error.shape[0]):
             gradient[j] += by_error[k] * error_jacobian[k, j]
-    return cost_kernels.tracking(data.cost, error)
+    return cost_kernels.tracking(data.model.cost, error)

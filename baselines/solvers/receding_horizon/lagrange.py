@@ -98,8 +98,8 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
 
     Other arguments are those of :func:`gradient.descend_rows`.
     """
-    alpha, difference, dt, (_, steps, n) = memory.alpha, settings.difference, data.dt, memory.plan.shape
-    e = frame_workspace(data.kind, nominal[0])[3].shape[0] if with_tasks else 0
+    alpha, difference, dt, (_, steps, n) = memory.alpha, settings.difference, data.model.dt, memory.plan.shape
+    e = frame_workspace(data.model.kind, nominal[0])[3].shape[0] if with_tasks else 0
     errors, by_errors = np.empty((steps, e)), np.empty((steps, e))
     states, by_q, by_qdot = np.empty((steps, n)), np.empty((steps, n)), np.empty((steps, n))
     diagonal, ratio, multipliers = np.empty(steps), np.empty(steps), np.empty((steps, n))
@@ -134,7 +134,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
             take_step(qdot, alpha[row], by_qdot)
             step += 1
         iterations[row] = step
-        status[row] = stop_if_diverged(status[row], value, first_value, data.limits[FASTEST], qdot)
+        status[row] = stop_if_diverged(status[row], value, first_value, data.model.limits[FASTEST], qdot)
         if status[row] == DIVERGED:
             alpha[row] = settings.alpha_min
 

@@ -66,7 +66,7 @@ def task_system(steps, e, n):
 @inner
 def kinematic_errors(data, nominal, q, errors):
     """ε(q); ``errors`` (HL - 1, e) receives it, other arguments as in :func:`analytic_task_gradient`."""
-    workspace = frame_workspace(data.kind, nominal)
+    workspace = frame_workspace(data.model.kind, nominal)
     for i in range(q.shape[0]):
         _error(data, nominal[i], q[i], workspace, errors[i])
 
@@ -96,7 +96,7 @@ def reduced_task_gradient(data, nominal, difference, x, system, gradient):
         value = difference_task_gradient(data, nominal, x, difference, system.jacobian, gradient)
     else:
         value = analytic_task_gradient(data, nominal, x, system.jacobian, gradient)
-    return value if reduce_task_gradient(data.dt, system, gradient) else np.inf
+    return value if reduce_task_gradient(data.model.dt, system, gradient) else np.inf
 
 
 @inner
@@ -106,14 +106,14 @@ def analytic_task_gradient(data, nominal, x, jacobian, gradient):
     ``jacobian`` receives ∂ε/∂q, of shape (HL - 1, e, n); other arguments as above. Gives the cost.
     """
     steps, n = x.q.shape
-    workspace = gradient_workspace(data.kind, nominal, n)
+    workspace = gradient_workspace(data.model.kind, nominal, n)
     total = 0.0
     for i in range(steps):
-        forward_and_jacobian(data.chain, x.q[i], workspace.rotation, workspace.position, workspace.geometric)
-        linearise(data.kind, nominal[i], workspace)
+        forward_and_jacobian(data.model.chain, x.q[i], workspace.rotation, workspace.position, workspace.geometric)
+        linearise(data.model.kind, nominal[i], workspace)
         jacobian[i] = workspace.error_jacobian
-        total += cost_kernels.tracking(data.cost, x.errors[i]) + velocity_cost(data, x.qdot[i])
-        cost_kernels.tracking_gradient(data.cost, x.errors[i], gradient.errors[i])
+        total += cost_kernels.tracking(data.model.cost, x.errors[i]) + velocity_cost(data, x.qdot[i])
+        cost_kernels.tracking_gradient(data.model.cost, x.errors[i], gradient.errors[i])
         velocity_gradient(data, x.qdot[i], gradient.qdot[i])
     return total
 
@@ -121,17 +121,17 @@ def analytic_task_gradient(data, nominal, x, jacobian, gradient):
 @inner
 def difference_task_gradient(data, nominal, x, delta, jacobian, gradient):
     """:func:`analytic_task_gradient` by forward differences: ``delta`` in q̇, Δt ``delta`` in E and q."""
-    (steps, n), e, small = x.q.shape, x.errors.shape[1], data.dt * delta
-    workspace, here, shifted = frame_workspace(data.kind, nominal), np.empty(e), np.empty(e)
+    (steps, n), e, small = x.q.shape, x.errors.shape[1], data.model.dt * delta
+    workspace, here, shifted = frame_workspace(data.model.kind, nominal), np.empty(e), np.empty(e)
     total = 0.0
     for i in range(steps):
-        tracking = cost_kernels.tracking(data.cost, x.errors[i])
+        tracking = cost_kernels.tracking(data.model.cost, x.errors[i])
         velocity = velocity_cost(data, x.qdot[i])
         total += tracking + velocity
         for a in range(e):
             kept = x.errors[i, a]
             x.errors[i, a] = kept + small
-            gradient.errors[i, a] = (cost_kernels.tracking(data.cost, x.errors[i]) - tracking) / small
+            gradient.errors[i, a] = (cost_kernels.tracking(data.model.cost, x.errors[i]) - tracking) / small
             x.errors[i, a] = kept
         _error(data, nominal[i], x.q[i], workspace, here)
         for j in range(n):

@@ -17,7 +17,7 @@ def joint_weights(joints):
 def data_of(problem):
     """Of a scenario or a problem, with weights of the joints."""
     problem = Problem(problem.model, problem.task, problem.cost, problem.dt, problem.velocity_limit)
-    return HorizonModel(*problem.kernel_model, joint_weights(problem.model.joints))
+    return HorizonModel(problem.kernel_model, joint_weights(problem.model.joints))
 
 
 def horizon_cost(data, q, nominal, qdot):

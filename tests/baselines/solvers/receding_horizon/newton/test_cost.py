@@ -153,7 +153,7 @@ def test_other_exponents(p_x):
 def test_true_cost_is_that_of_the_horizon(arm, task):
     at = place(arm, task, at=range(1, 7), terminal=1.0, limits=False)
     qdot = np.diff(np.vstack([at.start, at.path]), axis=0) / at.data.dt
-    data = HorizonModel(*at.data, at.problem.joint_weights)
+    data = HorizonModel(at.data, at.problem.joint_weights)
     kernels = horizon_cost(data, at.start, at.nominal, qdot)
     mine = true_cost(at.problem, at.path, at.workspace)
     assert mine == pytest.approx(kernels, rel=1e-10)  # q is the sum of Δt q̇ up to rounding
