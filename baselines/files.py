@@ -174,24 +174,20 @@ def reason(error: Exception) -> str:
     return (" ".join(str(error).split()) or type(error).__name__)[:300].removesuffix(".")
 
 
-def resumed(
-    manifest: pathlib.Path, about: Mapping[str, Any], *, resume: bool, overwrite: bool
-) -> dict[str, Any] | None:
-    """Decides whether the work in a folder is resumed; the caller has locked the folder.
+def resumed(manifest: pathlib.Path, about: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The manifest of the work in a folder, which is resumed; the caller has locked the folder.
 
     Args:
         manifest: The JSON file that says which work the folder holds; nothing is written to it.
-        about: Values that must be equal in the manifest of the work that is resumed.
-        resume: Whether to continue with work that exists.
-        overwrite: Whether to replace work that exists.
+        about: Values that must be equal there.
 
     Returns:
-        The manifest of the work to be resumed; None if it begins anew.
+        Its content; None if there is no such file, and the work begins.
 
     Raises:
-        ResultsError: There is work and neither flag is given, or it is other work, or the manifest is damaged.
+        ResultsError: It is other work, or the manifest is damaged.
     """
-    if not check_flags(manifest, resume=resume, overwrite=overwrite):
+    if not manifest.exists():
         return None
     there = read_json(manifest)
     if not isinstance(there, dict):

@@ -71,7 +71,7 @@ def read_finished(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str,
         ResultsError: Another run has.
     """
     file = folder / "run.json"
-    there = resumed(file, identity(config, seed), resume=True, overwrite=False)
+    there = resumed(file, identity(config, seed))
     if there is not None:
         with reading(file):
             for name in ("validation_score", "steps"):

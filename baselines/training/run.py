@@ -10,15 +10,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import math
 import pathlib
 import platform
-import sys
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -31,28 +28,27 @@ from tensorboard.compat.proto.event_pb2 import Event
 from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.summary.writer.record_writer import RecordWriter
 from torch import nn
-from tqdm import tqdm
 
 import ikgym
 from baselines.agents.files import AgentFile, save_agent
 from baselines.agents.policy import Agent
 from baselines.episodes import Policy, add_up, rollouts
 from baselines.evaluation.metrics import describe, lost
-from baselines.files import check_flags, locked, read_bytes, reading, reason, resumed, write, write_json
+from baselines.files import read_bytes, reading, resumed, write, write_json
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.policy import Problem
 from baselines.statistics import geometric_mean
 from baselines.training.apg import Trainer
 from baselines.training.options import APG, TrainingError
-from baselines.workers import ALONE, TRIES, WorkerError, Workers, finished
 from ikgym import scenarios
-from ikgym.exceptions import IkgymError
 from ikgym.scenarios import Scenario
 
 #: The version of `run.json` and of `checkpoint.pt`.
 FORMAT = 4
 RUN, CHECKPOINT, AGENT, EVENTS = "run.json", "checkpoint.pt", "agent.safetensors", "events.out.tfevents.apg"
+#: Shortest time between two checkpoints in [s].
+CHECKPOINT_EVERY = 15.0
 #: Weights above this have diverged.
 LARGEST = 1e9
 
@@ -65,57 +61,68 @@ def train(
     seed: int,
     folder: pathlib.Path,
     *,
-    resume: bool = False,
-    overwrite: bool = False,
-    checkpoint_every: float = 0.0,
     command: str = "baselines.training.run.train(…)",
     on_segment: OnSegment | None = None,
 ) -> dict[str, Any]:
-    """Trains an agent; returns the content of `run.json`. PyTorch uses one thread from then on.
+    """Trains an agent, or continues the run in the folder; PyTorch uses one thread from then on.
 
     Args:
         config: The options.
         seed: Determines all randomness.
-        folder: The folder of the run.
-        resume: Whether to continue the run in the folder, if there is one.
-        overwrite: Whether to replace the run in the folder.
-        checkpoint_every: Shortest time between two checkpoints, in [s].
+        folder: The folder of the run; the caller has locked it.
         command: The command that started the run, for `run.json`.
         on_segment: See :data:`OnSegment`.
 
+    Returns:
+        The content of `run.json`.
+
     Raises:
-        IkgymError: Training, validation or a file failed.
+        IkgymError: There is another run in the folder; training, validation or a file failed.
     """
     torch.set_num_threads(1)
-    with locked(folder):
-        run = _Run(config, seed, folder, command)
-        run.begin(resume=resume, overwrite=overwrite)
-        run.learn(checkpoint_every, on_segment)
-        return run.finish()
+    run = _Run(config, seed, folder, command)
+    run.begin()
+    run.learn(on_segment)
+    return run.finish()
+
+
+def read_finished(config: APG, seed: int, folder: pathlib.Path) -> dict[str, Any] | None:
+    """The `run.json` in a folder, if the same run has ended there.
+
+    Raises:
+        ResultsError: There is another run.
+    """
+    there = resumed(folder / RUN, identity(config, seed))
+    return there if there is not None and there.get("status") == "finished" else None
+
+
+def identity(config: APG, seed: int) -> dict[str, Any]:
+    """All that the result of a run depends on, for `run.json`."""
+    scenario = config.make_scenario()
+    return {
+        "format": FORMAT,
+        "method": "apg",
+        "seed": seed,
+        "config": config.to_json(),
+        "scenario": {"name": scenario.name, "steps": scenario.steps, "fingerprint": fingerprint(scenario)},
+        "versions": versions(),
+    }
 
 
 class _Run:
     def __init__(self, config: APG, seed: int, folder: pathlib.Path, command: str) -> None:
         self._config, self._folder, self._scenario = config, folder, config.make_scenario()
-        scenario = {name: getattr(self._scenario, name) for name in ("name", "steps")}
-        self._identity = {
-            "format": FORMAT,
-            "method": "apg",
-            "seed": seed,
-            "config": config.to_json(),
-            "scenario": {**scenario, "fingerprint": fingerprint(self._scenario)},
-            "versions": versions(),
-        }
+        self._identity = identity(config, seed)
         self._about = {**self._identity, "status": "running", "command": command, "machine": describe()}
         self._trainer = Trainer(config, self._scenario, seed)
         self._segments, self._history, self._best = 0, list[dict[str, Any]](), dict[str, Any]()
         self._core_seconds, self._clock = 0.0, time.process_time()
 
-    def begin(self, *, resume: bool, overwrite: bool) -> None:
-        """Prepares the folder, and restores the state of the run to resume, if there is one."""
+    def begin(self) -> None:
+        """Prepares the folder, and restores the state of the run in it, if there is one."""
         policy_of(self._trainer.agent(), self._scenario)  # what is refused is refused before files are replaced
         manifest, checkpoint = self._folder / RUN, self._folder / CHECKPOINT
-        there = resumed(manifest, self._identity, resume=resume, overwrite=overwrite)
+        there = resumed(manifest, self._identity)
         if there is None:
             clear(self._folder)
         else:
@@ -129,7 +136,7 @@ class _Run:
             self._core_seconds = state["core_seconds"]
         write_json(manifest, self._content())
 
-    def learn(self, checkpoint_every: float, on_segment: OnSegment | None) -> None:
+    def learn(self, on_segment: OnSegment | None) -> None:
         """Trains the segments that are left."""
         if not self._history:
             self._note({})
@@ -138,7 +145,7 @@ class _Run:
             metrics = self._segment()
             self._segments += 1
             cost = self._note(metrics)
-            if self._segments == self._config.segments or time.monotonic() - saved >= checkpoint_every:
+            if self._segments == self._config.segments or time.monotonic() - saved >= CHECKPOINT_EVERY:
                 self._save()
                 saved = time.monotonic()
             if on_segment is not None:
@@ -275,7 +282,7 @@ def load_checkpoint(file: pathlib.Path) -> dict[str, Any]:
     Raises:
         ResultsError: It cannot be read, is damaged, or has another format.
     """
-    with reading(file, "Begin anew with --overwrite."):
+    with reading(file, "Remove the folder to begin anew."):
         content = read_bytes(file)
         if hashlib.sha256(content[32:]).digest() != content[:32]:
             raise ValueError("its SHA-256 is another")
@@ -304,93 +311,3 @@ def weights_hash(policy: nn.Module) -> str:
 def _finite(policy: nn.Module) -> bool:
     """Whether no weight has diverged."""
     return all(bool((parameter.detach().abs() < LARGEST).all()) for parameter in policy.parameters())
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Job:
-    """The training of one seed, in any process.
-
-    Args:
-        config: The options.
-        seed: The seed.
-        folder: Its folder.
-        options: Further arguments of :func:`train`.
-        line: The line of the progress bar below the cursor; None for no bar.
-        remote: Whether a node of a cluster does it.
-    """
-
-    config: APG
-    seed: int
-    folder: pathlib.Path
-    options: Mapping[str, Any]
-    line: int | None = None
-    remote: bool = False
-
-
-def train_seeds(jobs: Sequence[Job], workers: Workers = ALONE) -> dict[int, dict[str, Any] | str]:
-    """Trains one agent a seed; returns the `run.json` of each seed, or why it failed.
-
-    One seed is trained in this process, several in separate ones, so that a seed that fails does not end the others. On
-    a cluster all nodes write into one shared folder: if a node is lost, its seed is resumed elsewhere from the last
-    checkpoint.
-
-    Raises:
-        ClusterError: There is no cluster.
-        ResultsError: On a cluster: a run exists, and is neither resumed nor overwritten.
-    """
-    remote = workers.cluster is not None
-    if remote:
-        jobs = [_prepare(job) for job in jobs]
-    elif len(jobs) == 1:
-        return {jobs[0].seed: train_seed(jobs[0])}
-    results: dict[int, dict[str, Any] | str] = dict.fromkeys((job.seed for job in jobs), "")
-    # On one machine a second attempt would fail again.
-    for job, future in finished(train_seed, jobs, workers, tries=TRIES if remote else 1):
-        try:
-            results[job.seed] = future.result()
-        except WorkerError as e:
-            results[job.seed] = f"{e} Continue with --resume."
-        except Exception as e:  # an error of the program does not end the other seeds
-            traceback.print_exc()
-            results[job.seed] = f"{type(e).__name__}: {reason(e)}"
-    return results
-
-
-def _prepare(job: Job) -> Job:
-    """The job for nodes of a cluster, which resume; its folder is cleared here, or kept."""
-    resume, overwrite = job.options["resume"], job.options["overwrite"]
-    check_flags(job.folder / RUN, resume=resume, overwrite=overwrite)
-    with locked(job.folder):
-        if not resume:
-            clear(job.folder)
-    options = {**job.options, "resume": True, "overwrite": False}
-    return dataclasses.replace(job, folder=job.folder.absolute(), options=options, line=None, remote=True)
-
-
-def train_seed(job: Job) -> dict[str, Any] | str:
-    """Trains the agent of a seed; returns its `run.json`, or why it failed."""
-    if job.remote and not job.folder.exists():
-        return f"{platform.node()} does not see {job.folder}: expected a folder that all nodes of the cluster share"
-    bar = tqdm(
-        total=job.config.segments,
-        desc=f"seed {job.seed}",
-        disable=job.line is None,
-        position=job.line,
-        file=sys.stderr,
-        unit="segment",
-        dynamic_ncols=True,
-        mininterval=0.1 if sys.stderr.isatty() else 10.0,
-    )
-
-    def show(done: int, cost: float | None) -> None:
-        if cost is not None:
-            bar.set_description(f"seed {job.seed}: cost {cost:.4g}", refresh=False)
-        bar.update(done - bar.n)
-
-    try:
-        with bar:
-            return train(job.config, job.seed, job.folder, on_segment=show, **job.options)
-    except IkgymError as e:
-        return " ".join(str(e).split())
-    except MemoryError as e:
-        return f"Out of memory: {reason(e)}. Choose fewer arms (--n-envs) or a smaller network (--hidden)."

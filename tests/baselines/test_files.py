@@ -11,7 +11,17 @@ import sys
 import pytest
 
 from baselines.evaluate import evaluate
-from baselines.files import LOCK, ResultsError, from_json, locked, read_arrays, read_json, resumed, write_json
+from baselines.files import (
+    LOCK,
+    ResultsError,
+    check_flags,
+    from_json,
+    locked,
+    read_arrays,
+    read_json,
+    resumed,
+    write_json,
+)
 
 HOLD = """
 import pathlib, sys, time
@@ -82,17 +92,15 @@ def test_a_damaged_file_is_named(tmp_path, content, read):
 
 def test_only_the_same_work_is_resumed(tmp_path):
     file, about = tmp_path / "it.json", {"seed": 1, "steps": 5}
-    assert resumed(file, about, resume=True, overwrite=False) is None
+    assert resumed(file, about) is None
     write_json(file, {**about, "done": 3})
-    assert resumed(file, about, resume=True, overwrite=False) == {**about, "done": 3}
-    assert resumed(file, about, resume=False, overwrite=True) is None
-    for given, flags, message in [
-        (about, (False, False), "it.json already exists: continue with --resume"),
-        (about, (True, True), "choose one"),
-        ({**about, "seed": 2}, (True, False), r"it.json differs in seed \(1 there, 2 here\)"),
-    ]:
-        with pytest.raises(ResultsError, match=message):
-            resumed(file, given, resume=flags[0], overwrite=flags[1])
+    assert resumed(file, about) == {**about, "done": 3}
+    with pytest.raises(ResultsError, match=r"it\.json differs in seed \(1 there, 2 here\)"):
+        resumed(file, {**about, "seed": 2})
     file.write_text("[]")
     with pytest.raises(ResultsError, match=r"it\.json is damaged"):
-        resumed(file, about, resume=True, overwrite=False)
+        resumed(file, about)
+    with pytest.raises(ResultsError, match=r"it\.json already exists: continue with --resume"):
+        check_flags(file, resume=False, overwrite=False)
+    with pytest.raises(ResultsError, match="choose one"):
+        check_flags(file, resume=True, overwrite=True)

@@ -8,72 +8,51 @@ import importlib.util
 import itertools
 import pathlib
 import shlex
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Union
 
 import tyro
+from tqdm import tqdm
 
 from baselines.cli import shell
 from baselines.cli.parsing import Rule, if_random
 from baselines.cli.parsing import parse as parse_options
 from baselines.files import check_writable, locked
 from baselines.training.options import APG, METHODS, Rewards, TrainingError, preset_names
-from baselines.workers import Workers
 from ikgym import rl, scenarios
 from ikgym.exceptions import InvalidInputError
-from ikgym.frozen import Frozen
-from ikgym.validation import Bounds, known_name, whole_number
+from ikgym.validation import known_name, whole_number
 
 PROGRAM = "train.py"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Options(Frozen):
-    """Options of runs that do not change their results."""
+class Runs:
+    """Runs of one method with several seeds."""
 
-    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
-    """One run each."""
-    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
-    """Folder for the files; the run with seed N has the folder seed-N in it."""
-    resume: bool = False
-    """Continue the runs in the folder; they end with the same weights as without the interruption."""
-    overwrite: bool = False
-    """Replace the runs in the folder."""
-    checkpoint_every: Annotated[float, tyro.conf.arg(metavar="SECONDS"), Bounds(at_least=0.0)] = 15.0
-    """Shortest time between two checkpoints; there are none within a segment."""
-    progress: bool = True
-    """Show a progress bar."""
-    workers: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Processes that train in parallel, one seed each."""
-    cluster: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Train on a cluster: ray, at the address in RAY_ADDRESS, a core for each seed. Its nodes share the folder."""
-    preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Options of a preset, or of a file NAME.toml; those on the command line take precedence."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Command:
-    """A training by gradients."""
-
-    config: Annotated[APG, tyro.conf.arg(name="")]
-    options: Annotated[Options, tyro.conf.arg(name="")]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ByRewards:
-    """A training by rewards."""
-
-    config: Annotated[Rewards, tyro.conf.arg(name="")]
     seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N …")] = (0,)
     """One run each, one after the other; the same command continues with those that have not ended."""
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")]
     """Folder of the runs; that with seed N has the folder seed-N in it."""
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ByGradients(Runs):
+    """A training by gradients."""
+
+    config: Annotated[APG, tyro.conf.arg(name="")]
+    preset: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Options of a preset, or of a file NAME.toml; those on the command line take precedence."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ByRewards(Runs):
+    """A training by rewards."""
+
+    config: Annotated[Rewards, tyro.conf.arg(name="")]
+
+
 RULES = (
-    Rule(("--workers",), lambda given: given.options.cluster is None, "with --cluster"),
-    Rule(("--workers",), lambda given: len(set(given.options.seeds)) > 1 or given.options.workers < 2, "on one seed"),
     Rule(("--learning-rate-end",), lambda given: given.config.segments > 1, "in one segment"),
     Rule(
         ("--reset-distance",),
@@ -103,8 +82,7 @@ environment by id. Each method has options: {prog} METHOD --help
 
 Examples:
   {prog} apg --preset quick --out runs/apg
-  {prog} apg --preset standard --seeds 0 1 2 --workers 2 --out runs/apg
-  {prog} apg --preset quick --out runs/apg --resume
+  {prog} apg --preset standard --seeds 0 1 2 --out runs/apg
   {prog} ppo --env ikgym/Track-v0 --minutes 10 --seeds 0 1 2 --out runs/track-ppo
   {prog} sac --env ikgym/Reach-v0 --total-timesteps 100000 --out runs/reach-sac
 
@@ -114,10 +92,10 @@ Files of a run by rewards, all but apg, in seed-N:
   curve.csv          CPU seconds, steps, and score on validation episodes: 0 standing still, 1 the best tuned solver
   run.json           at the end: settings, seed and final score
 
-Files of a run of apg, which may be killed at any time:
+Files of a run of apg, which may be killed at any time, and which the same command continues:
   run.json           command, seed, versions, a row for each segment, hash of the final weights
   events.out.…       the rows, for: tensorboard --logdir DIR
-  checkpoint.pt      the state, for --resume
+  checkpoint.pt      the state to continue from
   agent.safetensors  at the end, the agent, for: {evaluate} --policies agent:FILE
 
 Agents are trained on the seeds of the split "train" and validated on those of "validation"; those of "test" are not
@@ -126,28 +104,24 @@ used. The cost ratio is stated where the best known costs of all validation epis
 
 def main(arguments: Sequence[str]) -> int:
     """The command line: words after the command; returns the exit code."""
-    stopped = "Stopped."
 
     def work() -> int:
-        nonlocal stopped
         command = parse(arguments)
         for name in ("torch", "stable_baselines3", "sb3_contrib", "tensorboard"):
             if importlib.util.find_spec(name) is None:
                 raise ModuleNotFoundError(name=name)
         with shell.escaped_output():
-            if isinstance(command, ByRewards):
-                return _train_by_rewards(command)
-            stopped = f"Stopped. The last checkpoint is in {command.options.out}; continue with --resume."
-            return _train(command, shlex.join([*_program().split(), *arguments]))
+            _train(command, shlex.join([*_program().split(), *arguments]))
+        return 0
 
-    return shell.run(work, lambda: stopped)
+    return shell.run(work, lambda: "Stopped. The same command continues.")
 
 
 def _program() -> str:
     return shell.program("train", f"python {PROGRAM}")
 
 
-def parse(arguments: Sequence[str]) -> Command | ByRewards:
+def parse(arguments: Sequence[str]) -> ByGradients | ByRewards:
     """The command in a command line; without any words they are ``--help``."""
     given = list(arguments) or ["--help"]
     method = given[0]
@@ -158,7 +132,9 @@ def parse(arguments: Sequence[str]) -> Command | ByRewards:
     preset = _value_of("--preset", given) if method == "apg" else None
     kinds = [_subcommand(name, preset) for name in METHODS]
     any_of_them: Any = Union[tuple(kinds)]  # noqa: UP007  # made at run time
-    command: Command | ByRewards = parse_options(any_of_them, given, prog=_program(), description=manual(), rules=RULES)
+    command: ByGradients | ByRewards = parse_options(
+        any_of_them, given, prog=_program(), description=manual(), rules=RULES
+    )
     if isinstance(command, ByRewards):
         return dataclasses.replace(command, config=command.config.replace(algorithm=method))
     return command
@@ -168,8 +144,8 @@ def _subcommand(method: str, preset: str | None) -> Any:
     """The command of a method; options of apg that are left out are those of the preset."""
     about = METHODS[method]
     if method == "apg":
-        default: Any = Command(APG.preset(preset), Options(out=tyro.MISSING))
-        return Annotated[Command, tyro.conf.subcommand(method, default=default, description=about)]
+        default: Any = ByGradients(config=APG.preset(preset), out=tyro.MISSING)
+        return Annotated[ByGradients, tyro.conf.subcommand(method, default=default, description=about)]
     return Annotated[ByRewards, tyro.conf.subcommand(method, description=about)]
 
 
@@ -182,8 +158,9 @@ def _value_of(option: str, arguments: Sequence[str]) -> str | None:
     return None
 
 
-def _train_by_rewards(command: ByRewards) -> int:
-    from baselines.training import rewards  # imports PyTorch, an extra
+def _train(command: ByGradients | ByRewards, text: str) -> None:
+    """Trains all seeds, or continues with those that have not ended."""
+    from baselines.training import rewards, run  # import PyTorch, an extra
 
     runs = {seed: command.out / f"seed-{seed}" for seed in _checked_seeds(command.seeds)}
     with contextlib.ExitStack() as locks:  # all before the first training, which takes hours
@@ -191,32 +168,30 @@ def _train_by_rewards(command: ByRewards) -> int:
             locks.enter_context(locked(folder))
             check_writable(folder)
         for seed, folder in runs.items():
-            there = rewards.read_finished(command.config, seed, folder)
-            about = there or rewards.train(command.config, seed, folder)
-            score = f"score {about['validation_score']:.3f} after {about['steps']} steps"
+            if isinstance(command, ByRewards):
+                there = rewards.read_finished(command.config, seed, folder)
+                about = there or rewards.train(command.config, seed, folder)
+                score = f"score {about['validation_score']:.3f} after {about['steps']} steps"
+            else:
+                there = run.read_finished(command.config, seed, folder)
+                with _bar(seed, command.config.segments) as show:
+                    about = there or run.train(command.config, seed, folder, command=text, on_segment=show)
+                score = describe(about["kept"])
             print(f"seed {seed}: {score}{', already there' if there else ''}", flush=True)
     print(f"\nwritten to {command.out}")
-    return 0
 
 
-def _train(command: Command, text: str) -> int:
-    from baselines.training.run import Job, train_seeds  # imports PyTorch, an extra
+@contextlib.contextmanager
+def _bar(seed: int, segments: int) -> Iterator[Callable[[int, float | None], None]]:
+    """A progress bar on a terminal: the function that moves it."""
+    with tqdm(total=segments, desc=f"seed {seed}", disable=None, unit="segment", dynamic_ncols=True) as bar:
 
-    options, jobs = command.options, list[Job]()
-    workers = Workers(options.workers, options.cluster)
-    names = ("resume", "overwrite", "checkpoint_every")
-    given = {name: getattr(options, name) for name in names} | {"command": text}
-    for line, seed in enumerate(_checked_seeds(options.seeds)):
-        folder, bar = options.out / f"seed-{seed}", line if options.progress else None
-        jobs.append(Job(config=command.config, seed=seed, folder=folder, options=given, line=bar))
-    results = train_seeds(jobs, workers)
-    print(table(results))
-    errors = {seed: result for seed, result in results.items() if isinstance(result, str)}
-    for seed, error in errors.items():
-        print(f"error: seed {seed}: {error}", file=sys.stderr)
-    if len(errors) < len(results):
-        print(f"\nwritten to {options.out}")
-    return 2 if errors else 0
+        def show(done: int, cost: float | None) -> None:
+            if cost is not None:
+                bar.set_description(f"seed {seed}: cost {cost:.4g}", refresh=False)
+            bar.update(done - bar.n)
+
+        yield show
 
 
 def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
@@ -227,14 +202,7 @@ def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
     return checked
 
 
-def table(results: Mapping[int, Mapping[str, Any] | str]) -> str:
-    """A table of seeds and their scores, from the `run.json` of each."""
-    lines = [f"{'seed':>4}  {'cost ratio':>8}  {'cost':>10}  {'worst':>8}  {'lost':>6}"]
-    for seed, result in results.items():
-        if isinstance(result, str):
-            lines.append(f"{seed:>4}  failed")
-            continue
-        score = result["kept"]
-        ratio = f"{score['cost_ratio']:.4f}" if "cost_ratio" in score else "–"
-        lines.append(f"{seed:>4}  {ratio:>8}  {score['cost']:>10.5g}  {score['worst']:>8.4g}  {score['lost']:>6.1%}")
-    return "\n".join(lines)
+def describe(score: Mapping[str, float]) -> str:
+    """The validation of an agent in words."""
+    ratio = f"cost ratio {score['cost_ratio']:.4f}, " if "cost_ratio" in score else ""
+    return f"{ratio}cost {score['cost']:.5g}, worst {score['worst']:.4g}, lost {score['lost']:.1%}"

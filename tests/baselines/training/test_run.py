@@ -67,10 +67,10 @@ def test_a_run_that_was_stopped_ends_like_one_that_was_not(finished, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(CONFIG, 3, tmp_path, checkpoint_every=1e9, on_segment=stop)
+        train(CONFIG, 3, tmp_path, on_segment=stop)
     assert about(tmp_path)["training"]["segments"] == 1  # the first one is written at once
     assert not (tmp_path / "agent.safetensors").exists()
-    assert train(CONFIG, 3, tmp_path, resume=True)["kept"] == result["kept"]
+    assert train(CONFIG, 3, tmp_path)["kept"] == result["kept"]
     assert_same_run(folder, tmp_path)
     for each in (folder, tmp_path):
         events = EventAccumulator(str(each)).Reload()
@@ -111,7 +111,7 @@ def test_killed_at_random_moments(tmp_path, kills):
     train(config, 3, tmp_path / "undisturbed")
     longest, folder, killed = time.monotonic() - begin, tmp_path / "killed", 0
     while killed < kills:
-        process = FORK.Process(target=train, args=(config, 3, folder), kwargs={"resume": True}, daemon=True)
+        process = FORK.Process(target=train, args=(config, 3, folder), daemon=True)
         process.start()
         while process.is_alive() and not (folder / "run.json").exists():
             time.sleep(0.01)
@@ -123,7 +123,7 @@ def test_killed_at_random_moments(tmp_path, kills):
         if process.exitcode == 0:  # it was quicker
             assert_same_run(tmp_path / "undisturbed", folder)
             folder, longest = tmp_path / f"{longest}", 0.5 * longest
-    train(config, 3, folder, resume=True)
+    train(config, 3, folder)
     assert_same_run(tmp_path / "undisturbed", folder)
 
 
@@ -135,7 +135,7 @@ def copied(folder, path):
 def test_finished_runs_are_left_as_they_are(finished):
     folder, result = finished
     before = timeless(folder)
-    assert train(CONFIG, 3, folder, resume=True)["weights_sha256"] == result["weights_sha256"]
+    assert train(CONFIG, 3, folder)["weights_sha256"] == result["weights_sha256"]
     assert timeless(folder) == before
     assert {file.name for file in folder.iterdir() if file.is_file()} - {".lock"} == {
         "run.json",
@@ -157,7 +157,7 @@ def test_a_run_killed_between_its_last_checkpoint_and_its_description_is_complet
         patched.setattr(run_module, "write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             train(CONFIG, 3, tmp_path)
-    assert train(CONFIG, 3, tmp_path, resume=True)["weights_sha256"] == finished[1]["weights_sha256"]
+    assert train(CONFIG, 3, tmp_path)["weights_sha256"] == finished[1]["weights_sha256"]
     assert timeless(tmp_path) == timeless(finished[0])
 
 
@@ -175,7 +175,7 @@ def test_a_full_disk_ends_a_run_with_a_message_and_it_is_resumed(part, finished,
         patched.setattr(files, "write", write_if_there_is_space)
         with pytest.raises(ResultsError, match=f"^Cannot write .*{part}: No space left on device\\.$"):
             train(CONFIG, 3, tmp_path, on_segment=lambda done, cost: segments.append(done))
-    train(CONFIG, 3, tmp_path, resume=True)
+    train(CONFIG, 3, tmp_path)
     assert_same_run(finished[0], tmp_path)
 
 
@@ -185,9 +185,9 @@ def test_links_are_replaced_and_not_followed(tmp_path):
     theirs.write_text("of somebody else")
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "tensorboard").symlink_to(tmp_path / "elsewhere")
-    for file in ("run.json", "checkpoint.pt", "events.out.tfevents.apg", "agent.safetensors"):
+    for file in ("checkpoint.pt", "events.out.tfevents.apg", "agent.safetensors"):
         (tmp_path / "run" / file).symlink_to(theirs)
-    train(CONFIG.replace(segments=1), 3, tmp_path / "run", overwrite=True)
+    train(CONFIG.replace(segments=1), 3, tmp_path / "run")
     assert [file.read_text() for file in (tmp_path / "elsewhere").iterdir()] == ["of somebody else"]
 
 
@@ -197,32 +197,22 @@ def test_seeds_differ_and_validation_changes_nothing(finished, tmp_path):
     assert train(seldom, 3, tmp_path / "3")["weights_sha256"] == finished[1]["weights_sha256"]
 
 
-def test_folders_are_not_overwritten(finished, tmp_path):
-    folder, _ = finished
-    with pytest.raises(ResultsError, match="already exists: continue with --resume"):
-        train(CONFIG, 3, folder)
-    with pytest.raises(ResultsError, match="choose one"):
-        train(CONFIG, 3, folder, resume=True, overwrite=True)
+def test_other_files_of_a_folder_stay(tmp_path):
     (tmp_path / "mine.txt").write_text("stays")
     (tmp_path / ".checkpoint.pt.123.tmp").write_text("of a run that was killed")
-    short = CONFIG.replace(segments=1)
-    train(short, 3, tmp_path)
-    first = about(tmp_path)
-    train(short, 4, tmp_path, overwrite=True)
-    assert about(tmp_path)["seed"] == 4
-    assert about(tmp_path)["weights_sha256"] != first["weights_sha256"]
+    train(CONFIG.replace(segments=1), 3, tmp_path)
     assert (tmp_path / "mine.txt").exists()
     assert not list(tmp_path.glob(".*"))
 
 
 def test_another_run_is_not_resumed(finished, monkeypatch):
     with pytest.raises(ResultsError, match="differs in config"):
-        train(CONFIG.replace(learning_rate=1e-2), 3, finished[0], resume=True)
+        train(CONFIG.replace(learning_rate=1e-2), 3, finished[0])
     with pytest.raises(ResultsError, match=r"differs in seed \(3 there, 4 here\)"):
-        train(CONFIG, 4, finished[0], resume=True)
+        train(CONFIG, 4, finished[0])
     monkeypatch.setattr(run_module, "versions", lambda: {**about(finished[0])["versions"], "torch": "1.0"})
     with pytest.raises(ResultsError, match="differs in versions"):
-        train(CONFIG, 3, finished[0], resume=True)
+        train(CONFIG, 3, finished[0])
 
 
 class Evil:
@@ -249,7 +239,7 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     else:
         save_checkpoint(tmp_path / name, content)
     with pytest.raises(ResultsError, match=message):
-        train(CONFIG, 3, tmp_path, resume=True)
+        train(CONFIG, 3, tmp_path)
 
 
 def test_a_checkpoint_with_one_other_byte_is_damaged(finished, tmp_path):
@@ -258,7 +248,7 @@ def test_a_checkpoint_with_one_other_byte_is_damaged(finished, tmp_path):
     content[len(content) // 2] ^= 1
     (tmp_path / "checkpoint.pt").write_bytes(content)
     with pytest.raises(ResultsError, match="its SHA-256 is another"):
-        train(CONFIG, 3, tmp_path, resume=True)
+        train(CONFIG, 3, tmp_path)
 
 
 def test_weights_that_diverge(tmp_path):
