@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.kernels.jit import inner, kernel
-from ikgym.validation import known_name
+from ikgym.validation import one_of
 
 Singles = npt.NDArray[np.float32]
 
@@ -50,8 +50,8 @@ class Network(Frozen):
 
     weights: tuple[Singles, ...]
     biases: tuple[Singles, ...]
-    activation: str = "relu"
-    squash: str = "clip"
+    activation: Annotated[str, one_of(ACTIVATIONS)] = "relu"
+    squash: Annotated[str, one_of(SQUASHES)] = "clip"
 
     #: Inputs, widths of the hidden layers, and outputs.
     sizes: tuple[int, ...] = dataclasses.field(init=False)
@@ -59,8 +59,7 @@ class Network(Frozen):
     constants: tuple[object, ...] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        known_name("activation", self.activation, ACTIVATIONS)
-        known_name("squash", self.squash, SQUASHES)
+        super().__post_init__()
         weights, biases = _layers("weights", self.weights, 2), _layers("biases", self.biases, 1)
         if not weights or len(weights) != len(biases):
             raise InvalidInputError(

@@ -11,7 +11,7 @@ import numpy as np
 from baselines.oracle.cache import solve
 from baselines.oracle.optimum import Search, Starts
 from baselines.oracle.stripped import NOTE, strips
-from baselines.policy import Batch, Memory, Problem, Solution, statuses
+from baselines.policy import Problem
 from baselines.solvers.references.follow_nominal import PrivilegedPath
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -68,9 +68,3 @@ class Oracle(PrivilegedPath):
         path = np.vstack([optimum.q[:1], optimum.q])
         path.flags.writeable = False
         return path
-
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt
-        rows = len(qdot)
-        return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))

@@ -6,8 +6,8 @@ import dataclasses
 import functools
 import json
 import pathlib
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import tyro
 
@@ -19,7 +19,7 @@ from ikgym.frozen import Frozen
 from ikgym.kernels.tasks import SKEW
 from ikgym.rl.scoring import EPISODES
 from ikgym.scenarios import Scenario
-from ikgym.validation import known_name, known_names, number, whole_number
+from ikgym.validation import Bounds, known_name, known_names, whole_number
 
 #: Methods by name: what the command line says about them.
 METHODS = {
@@ -47,24 +47,12 @@ def _whole_numbers(name: str, value: object, *, most: int, at_most: int) -> tupl
     return tuple(whole_number(name, element, at_least=1, at_most=at_most) for element in value)
 
 
-def _or_none(check: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
-    """A check that None passes."""
-    return lambda name, value: None if value is None else check(name, value)
-
-
 _N, _MANY, _X = (tyro.conf.arg(metavar=metavar) for metavar in ("N", "N …", "X"))
-#: Bounds of options, so that a typing error gives a message and does not exhaust the memory.
-_check_count = functools.partial(whole_number, at_least=1)
-_check_number = functools.partial(number, above=0.0)
-_Count = Annotated[int, _N, _check_count]
-_CountOrNone = Annotated[int | None, _N, _or_none(_check_count)]
-_Number = Annotated[float, _X, _check_number]
-_NumberOrNone = Annotated[float | None, _X, _or_none(_check_number)]
+#: Options within bounds, so that a typing error gives a message and does not exhaust the memory.
+_Count = Annotated[int, _N, Bounds(at_least=1)]
+_Number = Annotated[float, _X, Bounds(above=0.0)]
 _Layers = Annotated[tuple[int, ...], _MANY, functools.partial(_whole_numbers, most=10, at_most=2048)]
 _Windows = Annotated[tuple[int, ...], _MANY, functools.partial(_whole_numbers, most=100, at_most=10_000)]
-_Arms = Annotated[int, _N, functools.partial(whole_number, at_least=1, at_most=10_000)]
-_Episodes = Annotated[int, _N, functools.partial(whole_number, at_least=1, at_most=len(scenarios.SPLITS["validation"]))]
-_Share = Annotated[float, tyro.conf.arg(metavar="β"), functools.partial(number, at_least=0.0, at_most=1.0)]
 
 
 class Schedule(NamedTuple):
@@ -87,7 +75,7 @@ class APG(Frozen):
     scenario: Annotated[str, tyro.conf.arg(metavar="NAME")] = "varga7-random"
     """The scenario to train on. Random scenarios are trained on seeds of the split "train". If it shows skew
     coordinates, whose errors are no twists, the agent is trained on whole poses; it resolves the 90° ambiguity."""
-    steps: _CountOrNone = None
+    steps: Annotated[int | None, _N, Bounds(at_least=1)] = None
     """Largest number of steps of an episode, in training and validation, for short trials. That of the scenario if left
     out."""
     offsets: Annotated[tuple[int, ...], _MANY] = Bilinear.offsets
@@ -98,14 +86,14 @@ class APG(Frozen):
     """Neurons of the hidden layers: at most 10 layers of at most 2048 neurons."""
     activation: Activation = "silu"
     """Activation of the hidden layers."""
-    n_envs: _Arms = 256
+    n_envs: Annotated[int, _N, Bounds(at_least=1, at_most=10_000)] = 256
     """Number of arms stepped together, at most 10000. At first they are spread over their episodes."""
     segments: _Count = 20
     """Number of parts of the training. A validation and a checkpoint may follow each of them."""
     evaluate_every: _Count = 2
     """Segments between validations; the untrained and the final agent are always validated. The agent with the least
     geometric mean of the costs is kept."""
-    validation_episodes: _Episodes = 32
+    validation_episodes: Annotated[int, _N, Bounds(at_least=1, at_most=len(scenarios.SPLITS["validation"]))] = 32
     """Episodes of each validation: the first seeds of the split "validation". A deterministic scenario has one."""
     learning_rate: _Number = 2e-3
     """Learning rate of Adam in the first segment."""
@@ -132,7 +120,7 @@ class APG(Frozen):
     """Arms farther from their reference position than this, in [m], are put back on the reference path."""
     reset_distance_end: _Number = 1.0
     """Displacement in the segments of the last window, in which the agent learns to come back from farther away."""
-    averaging: _Share = 0.99
+    averaging: Annotated[float, tyro.conf.arg(metavar="β"), Bounds(at_least=0.0, at_most=1.0)] = 0.99
     """Factor of the exponential moving average of the weights, which is the agent."""
     init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
     """The agent.safetensors of an earlier run with the first weights; offsets, damping, hidden and activation must be
@@ -140,7 +128,6 @@ class APG(Frozen):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known_name("activation", self.activation, get_args(Activation))
         self._settle(offsets=self.processing.offsets, damping=self.processing.damping)
         if self.init is not None:
             self._settle(init=pathlib.Path(self.init))
@@ -228,9 +215,9 @@ class Rewards(Frozen):
     """One of :data:`METHODS`, except apg."""
     env: Annotated[str, tyro.conf.arg(metavar="ID")]
     """The environment, such as ikgym/Track-v0."""
-    total_timesteps: _CountOrNone = None
+    total_timesteps: Annotated[int | None, _N, Bounds(at_least=1)] = None
     """Steps of all arms together; n_timesteps of the settings if left out."""
-    minutes: _NumberOrNone = None
+    minutes: Annotated[float | None, _X, Bounds(above=0.0)] = None
     """CPU time without validations after which a run ends early."""
     settings: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.yml")] = None
     """Settings in the format of rl-zoo3; the published ones if left out."""
@@ -238,7 +225,7 @@ class Rewards(Frozen):
     """Take the defaults of the library and one arm in place of settings."""
     validations: _Count = 10
     """Rows of the curve, evenly spaced."""
-    episodes: Annotated[int, _N, functools.partial(whole_number, at_least=1, at_most=EPISODES)] = 32
+    episodes: Annotated[int, _N, Bounds(at_least=1, at_most=EPISODES)] = 32
     """Episodes of a validation."""
 
     def __post_init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.outcome import OBSERVED
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios.preview import offsets as checked_offsets
-from ikgym.validation import FloatArray, number, whole_number
+from ikgym.validation import Bounds, FloatArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Bilinear(Processing):
     """
 
     offsets: tuple[int, ...] = (1, 10, 40, 80, 130, 200, 300, 450, 650, 900)
-    damping: float = 1e-2
-    interval: int = 8
+    damping: Annotated[float, Bounds(above=0.0)] = 1e-2
+    interval: Annotated[int, Bounds(at_least=1)] = 8
 
     #: The offsets as kernels take them.
     _ahead: npt.NDArray[np.int64] = dataclasses.field(init=False, repr=False, compare=False)
@@ -71,6 +71,7 @@ class Bilinear(Processing):
     kind: ClassVar[str] = "bilinear"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         try:
             offsets = checked_offsets(self.offsets)
         except InvalidInputError as e:
@@ -81,9 +82,7 @@ class Bilinear(Processing):
             )
         ahead = np.array(offsets, dtype=np.int64)
         ahead.flags.writeable = False
-        damping = number("damping", self.damping, above=0.0)
-        interval = whole_number("interval", self.interval, at_least=1)
-        self._settle(offsets=offsets, damping=damping, interval=interval, _ahead=ahead)
+        self._settle(offsets=offsets, _ahead=ahead)
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:

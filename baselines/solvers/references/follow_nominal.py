@@ -7,7 +7,6 @@ import dataclasses
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from baselines.policy import Batch, Memory, Problem, Solution, SolverPolicy, statuses
 from ikgym.exceptions import InvalidInputError
@@ -43,11 +42,12 @@ class PrivilegedPath(SolverPolicy, abc.ABC):
             )
         return cls(Problem.of(scenario), path=path, **parameters)  # type: ignore[call-arg]  # a field of subclasses
 
-    def next_rows(self, batch: Batch) -> npt.NDArray[np.int64]:
-        """The rows of the path that belong to the end of the step. Shape (B,)."""
-        last = len(self.path) - 1
-        rows: npt.NDArray[np.int64] = np.clip(last + 1 - batch.remaining[:, 0].astype(np.int64), 0, last)
-        return rows
+    def solve(self, batch: Batch, memory: Memory) -> Solution:
+        """See :meth:`SolverPolicy.solve`; to the row of the path that belongs to the end of the step."""
+        last, rows = len(self.path) - 1, len(batch.q)
+        ends = np.clip(last + 1 - batch.remaining[:, 0].astype(np.int64), 0, last)
+        qdot = (self.path[ends] - batch.q) / self.problem.dt
+        return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,9 +75,3 @@ class FollowNominal(PrivilegedPath):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._settle(path=frozen_array("path", self.path, (None, self.problem.model.joints)))
-
-    def solve(self, batch: Batch, memory: Memory) -> Solution:
-        """See :meth:`SolverPolicy.solve`."""
-        qdot = (self.path[self.next_rows(batch)] - batch.q) / self.problem.dt
-        rows = len(qdot)
-        return Solution(qdot, memory, statuses(rows), np.zeros(rows, dtype=np.int64))

@@ -98,7 +98,7 @@ def parts(file):
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or track, got 'raw'"),
         (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
         (lambda t, a: a["processing"].update(ahead=[2, 1]), "rising times above 0"),
-        (lambda t, a: a["network"].update(activation="gelu"), "no activation 'gelu'"),
+        (lambda t, a: a["network"].update(activation="gelu"), "no choice of activation 'gelu'"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "tensors: expected float32 of the shapes"),
         (lambda t, a: a.update(joints=6), "changed after it was written"),
         (lambda t, a: t.pop("layers.0.bias"), "tensors: expected float32 of the shapes"),
