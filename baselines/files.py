@@ -174,7 +174,7 @@ def reason(error: Exception) -> str:
     return (" ".join(str(error).split()) or type(error).__name__)[:300].removesuffix(".")
 
 
-def resumed(manifest: pathlib.Path, about: Mapping[str, Any]) -> dict[str, Any] | None:
+def read_resumable(manifest: pathlib.Path, about: Mapping[str, Any]) -> dict[str, Any] | None:
     """The manifest of the work in a folder, which is resumed; the caller has locked the folder.
 
     Args:

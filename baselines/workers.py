@@ -91,7 +91,7 @@ class Workers:
 ALONE = Workers()
 
 
-def finished(
+def run_units(
     function: Callable[[Unit], Result], units: Sequence[Unit], workers: Workers, *, tries: int = TRIES
 ) -> Generator[tuple[Unit, Future[Result]], None, None]:
     """Does units of work in other processes, and yields each as soon as it is done.

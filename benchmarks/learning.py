@@ -143,22 +143,22 @@ def picture(lines: Sequence[Line]) -> Figure:
 def main() -> None:
     """Trains what is missing, and writes the files."""
     command = tyro.cli(Command, description=__doc__)
-    kept = {tuple(line[name] for name in RUN) for line in _measured()}
+    kept = {tuple(line[name] for name in RUN) for line in _read_curves()}
     missing = [one for one in command.trainings() if tuple(about(one).values()) not in kept]
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(command.workers, context) as pool:
         jobs = {pool.submit(curve, one): about(one) for one in missing}
         for done, job in enumerate(concurrent.futures.as_completed(jobs), 1):
             new = job.result()
-            lines = [line for line in _measured() if not _same(line, jobs[job])] + new
+            lines = [line for line in _read_curves() if not _same(line, jobs[job])] + new
             lines.sort(key=lambda line: (*(line[name] for name in RUN if name != "digest"), float(line["steps"])))
             write(CURVES, to_csv(lines).encode())
             print(f"{done} of {len(jobs)}: {' '.join(jobs[job].values())}: {new[-1]['score']}", flush=True)
-    write(TABLE, to_csv(table(_measured())).encode())
-    write(PICTURE, style.small_png(picture(_measured())))
+    write(TABLE, to_csv(table(_read_curves())).encode())
+    write(PICTURE, style.small_png(picture(_read_curves())))
 
 
-def _measured() -> list[Line]:
+def _read_curves() -> list[Line]:
     """The lines of the curves; another process may add some."""
     return from_csv(CURVES.read_text(encoding="utf-8")) if CURVES.exists() else []
 

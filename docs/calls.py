@@ -28,7 +28,7 @@ CASES: tuple[tuple[str, str, Drives | str, str], ...] = (
 )
 
 
-def measured(steps: int = 1000, turns: int = 10) -> list[Line]:
+def measure(steps: int = 1000, turns: int = 10) -> list[Line]:
     """The table: medians over some turns along an episode."""
     return [_line(*case, steps, turns) for case in CASES]
 

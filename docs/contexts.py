@@ -73,7 +73,7 @@ class Command:
     """One training each."""
 
 
-def measured(*, only_new: bool = False) -> list[Line]:
+def measure(*, only_new: bool = False) -> list[Line]:
     """The table: costs relative to the policy that knows the plant, and the share of the gap to it that is closed."""
     old = {line["policy"]: line for line in lines("contexts")}
     told, out = _solver(TOLD), []

@@ -13,7 +13,7 @@ from ikgym import scenarios
 CIRCLES = 5
 
 
-def measured() -> list[Line]:
+def measure() -> list[Line]:
     """The table, one line a scenario and policy, as its lines say."""
     return [_line(one["scenario"], one["policy"]) for one in lines("drift")]
 

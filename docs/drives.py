@@ -68,7 +68,7 @@ def play(scenario: ikgym.Scenario, policy: str) -> tuple[float, float]:
     return float(cost), 1e3 * max(float(one.position_error.max()) for one in played)
 
 
-def measured(bench: Path | None) -> list[Line]:
+def measure(bench: Path | None) -> list[Line]:
     """The table, measured on the test bench in a folder.
 
     Raises:
@@ -77,10 +77,10 @@ def measured(bench: Path | None) -> list[Line]:
     if bench is None:
         raise SystemExit("drives: this table needs --bench FOLDER, see docs/drives.py.")
     sys.path.insert(0, str(bench.resolve()))
-    return _measured(importlib.import_module("plant"))
+    return _measure(importlib.import_module("plant"))
 
 
-def _measured(bench: Any) -> list[Line]:
+def _measure(bench: Any) -> list[Line]:
     usual = ikgym.scenarios.get(SCENARIO).replace(dt=PERIOD, steps=STEPS)
     table: list[Line] = []
     for kind, late, payload in itertools.product(SERVOS, LATE, PAYLOADS):

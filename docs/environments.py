@@ -22,7 +22,7 @@ SCENARIOS = ("varga7-fast", "varga7-random")
 MOST = 1024
 
 
-def measured(sizes: Sequence[int] = (64, 1024, 16384), **effort: Any) -> list[Line]:
+def measure(sizes: Sequence[int] = (64, 1024, 16384), **effort: Any) -> list[Line]:
     """The table, one line an environment and number of arms; 1 means `gym.make`."""
     calls = {(f"RedundantIK-v0, {name}", 1): _single("RedundantIK-v0", scenario=name) for name in SCENARIOS}
     calls |= {(name, 1): _single(name) for name in ("Pendulum-v1", "Reacher-v5")}

@@ -154,7 +154,7 @@ def compare(arm: Arm, calls: Mapping[str, Solve], poses: FloatArray) -> list[Lin
     ]
 
 
-def measured(poses: int = POSES) -> list[Line]:
+def measure(poses: int = POSES) -> list[Line]:
     """The table, one line an arm and solver."""
     table: list[Line] = []
     for arm in map(ikgym.arms.get, ARMS):

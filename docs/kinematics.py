@@ -22,7 +22,7 @@ def _loop(chain, q, rotation, position, jacobian):  # type: ignore[no-untyped-de
         forward_and_jacobian(chain, q[row], rotation, position, jacobian)
 
 
-def measured(**effort: Any) -> list[Line]:
+def measure(**effort: Any) -> list[Line]:
     """The table."""
     arm = ikgym.arms.get("varga7")
     q = np.random.default_rng(0).uniform(-1, 1, (BATCH, arm.joints))

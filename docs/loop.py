@@ -78,7 +78,7 @@ class DrivenArm:
         self._qdot = command + left * gap
 
 
-def played(controller: Controller, scenario: ikgym.Scenario, drives: Drives) -> tuple[Any, Any]:
+def play(controller: Controller, scenario: ikgym.Scenario, drives: Drives) -> tuple[Any, Any]:
     """Position errors in [m] and commands in [rad/s] on such drives. Shapes (k,), (k, n)."""
     ahead, arm = controller.ahead, DrivenArm(drives, scenario.start_of(), scenario.dt)
     nominal, errors, commands = scenario.nominal(0, ahead), [], []
@@ -101,12 +101,12 @@ def line(policy: str, given: str, period: float, lag: float | None, delay: int) 
     scenario = circle(arm.replace(acceleration_limit=np.full(7, np.inf)), arm.home, period)
     lost = Guards(position_error=None, orientation_error=None)
     known = {"perfect": Drives(), "given": drives, "identify": "identify"}[given]
-    errors, commands = played(Controller(scenario, policy, known, guards=lost), scenario, drives)
+    errors, commands = play(Controller(scenario, policy, known, guards=lost), scenario, drives)
     case = {"policy": policy, "drives": given, "period_ms": 1e3 * period, "lag_ms": 1e3 * (lag or 0.0), "delay": delay}
     times = (np.abs(commands).max(axis=0) / peaks(scenario, policy)).max()
     return case | {"error_um": 1e6 * float(errors[round(FIRST / period) :].max()), "times_peak": float(times)}
 
 
-def measured() -> list[Line]:
+def measure() -> list[Line]:
     """The table."""
     return [line(*loop, *case) for loop, *case in itertools.product(LOOPS, PERIODS, LAGS, DELAYS)]

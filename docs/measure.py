@@ -1,6 +1,6 @@
 """Measures tables of `docs/results`: ``python -m docs.measure cost_time periods``.
 
-A table with a module of its name in this folder is what its `measured` returns; a new one begins as an empty CSV file.
+A table with a module of its name in this folder is what its `measure` returns; a new one begins as an empty CSV file.
 Others say by their lines what is played: scenario, policy, episodes, noise seeds and seeds. Where `policy` is a label,
 the column `spec` has what is played. To add a policy, add a line with these columns; --new measures those
 alone. Each policy is timed in two episodes, on one core: times compare within one run on an idle machine. A killed
@@ -47,7 +47,7 @@ class Command:
     """Folder of the arm with masses that the table `drives` is measured on, see :mod:`docs.drives`."""
 
 
-def measured(name: str, *, only_new: bool = False) -> list[Line]:
+def measure_lines(name: str, *, only_new: bool = False) -> list[Line]:
     """The lines of a table, scenario by scenario, from low to high cost ratios."""
     old = lines(name)
     groups = itertools.groupby(old, lambda line: line["scenario"])
@@ -134,8 +134,8 @@ def table_of(name: str, *, only_new: bool = False, bench: Path | None = None) ->
         available = ", ".join(sorted(file.stem for file in RESULTS.glob("*.csv")))
         raise SystemExit(f"tables: expected names of tables, got {name!r}; available: {available}.")
     if not (PAGES / f"{name}.py").is_file():
-        return measured(name, only_new=only_new)
-    measure = importlib.import_module(f"docs.{name}").measured
+        return measure_lines(name, only_new=only_new)
+    measure = importlib.import_module(f"docs.{name}").measure
     if "only_new" in inspect.signature(measure).parameters:
         return list(measure(only_new=only_new))
     if only_new:

@@ -46,7 +46,7 @@ def line(name: str) -> Line:
     whole = len(found) == poses
     out: Line = {"problem": name, "poses": poses, "reached": len(found), "without_collisions": len(free)}
     out["planned"] = int(whole and verdict(scenario, found).passed)
-    out["rhc_foresight"] = int(whole and judged(scenario, found[0]).passed)
+    out["rhc_foresight"] = int(whole and judge(scenario, found[0]).passed)
     passed, starts = among_starts(scenario)
     out |= {"qp": int(passed > 0), "qp_passed": passed, "qp_starts": starts}
     theirs = [verdict(scenario, joints) for joints in problems.get(name).trajectories.values()]
@@ -62,7 +62,7 @@ def route(scenario: Scenario, search: Mapping[str, Any] = MappingProxyType({})) 
     return Routes(scenario, scenario.times(scenario.steps + 1)[::STRIDE], largest, **search).route()
 
 
-def judged(scenario: Scenario, start: FloatArray) -> Verdict:
+def judge(scenario: Scenario, start: FloatArray) -> Verdict:
     """How `rhc_foresight` follows from a start."""
     begun = slow(scenario.replace(start=start))
     outcome = rollout(begun, baselines.make("rhc_foresight", begun), 0, timed=False)
@@ -81,7 +81,7 @@ def among_starts(scenario: Scenario) -> tuple[int, int]:
     held = motion.ideal(slow(scenario))
     q = solutions(held)
     q = q[scenario.arm.clearance(q, scenario.obstacles)[0] > 0.0][:STARTS]
-    paths = motion.played(held, q).q[::STRIDE] if len(q) else np.empty((0, 0, 0))
+    paths = motion.play_from(held, q).q[::STRIDE] if len(q) else np.empty((0, 0, 0))
     return sum(verdict(scenario, paths[:, i]).passed for i in range(len(q))), len(q)
 
 
@@ -98,7 +98,7 @@ def table(problem_lines: Sequence[Line]) -> list[Line]:
     return out
 
 
-def measured() -> list[Line]:
+def measure() -> list[Line]:
     """The table, after what is missing was measured."""
     done = lines(PATHS)
     for name in problems.OBSTRUCTED:

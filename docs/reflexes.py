@@ -80,7 +80,7 @@ def reference_of(scenario: ikgym.Scenario, points: int) -> FloatArray:
     return rows[:points]
 
 
-def measured() -> list[Line]:
+def measure() -> list[Line]:
     """The table, one line an arm, a path and whether jerk is limited, with as many runs as its lines say.
 
     Runs are made line by line in turn; those of a measurement that was killed are read from its file.

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from baselines.paths import retime
-from baselines.paths.motion import ideal, path_duration, played
+from baselines.paths.motion import ideal, path_duration, play_from
 from baselines.paths.survey import follows
 from baselines.paths.timing import Timing
 from docs.keeping import Line
@@ -45,10 +45,10 @@ def by_one_factor(scenario: Scenario, start: FloatArray) -> float:
 
 def _follows(scenario: Scenario, start: FloatArray, factor: float) -> bool:
     trajectory = Timing.uniform(path_duration(scenario), factor).of(scenario.trajectory)
-    return follows(played(ideal(scenario, trajectory=trajectory, start=start), start[None]))
+    return follows(play_from(ideal(scenario, trajectory=trajectory, start=start), start[None]))
 
 
-def measured() -> list[Line]:
+def measure() -> list[Line]:
     """The table, one line a path."""
     return [_line(name, times) for name, times in PATHS]
 

@@ -74,7 +74,7 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
     return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
 
 
-def measured(name: str, *words: str) -> str:
+def measure(name: str, *words: str) -> str:
     """The table of a CSV file.
 
     `columns=NAME,NAME` chooses columns, `NAME=VALUE|VALUE` lines with such a value. With `across=NAME cells=NAME` each
@@ -97,11 +97,11 @@ def table(words: str) -> str:
     """The table, or the text, of the words after `<!-- table:`."""
     name, *rest = shlex.split(words)
     if name.startswith("results/"):
-        return measured(name.removeprefix("results/").removesuffix(".csv"), *rest)
+        return measure(name.removeprefix("results/").removesuffix(".csv"), *rest)
     return claims() if name == "claims" else markdown(TABLES[name]())
 
 
-def filled(text: str) -> str:
+def fill_in(text: str) -> str:
     """A page with its tables and texts updated."""
     place = re.compile(r"(<!-- table: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
     return place.sub(lambda m: f"{m[1]}{table(m[2])}\n{m[3]}", text)
@@ -110,7 +110,7 @@ def filled(text: str) -> str:
 def main() -> None:
     """Writes the tables into the pages."""
     for page in sorted(PAGES.rglob("*.md")):
-        page.write_text(filled(page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(fill_in(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ def terminal() -> Iterator[None]:
         yield
 
 
-def called(arguments: Sequence[str]) -> bool:
+def call(arguments: Sequence[str]) -> bool:
     """Calls the command with the words after ``ikgym``; whether it failed."""
     return bool(main(arguments))
 
@@ -33,7 +33,7 @@ def manual_of(*words: str) -> str:
     """Output of ``ikgym WORDS --help``."""
     out = io.StringIO()
     with terminal(), contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
-        called([*words, "--help"])
+        call([*words, "--help"])
     return without_spaces(out.getvalue())
 
 

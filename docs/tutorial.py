@@ -14,7 +14,7 @@ from typing import Any
 from unittest import mock
 
 from baselines import registry
-from docs.terminal import called, terminal, without_spaces
+from docs.terminal import call, terminal, without_spaces
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -29,7 +29,7 @@ def parts(page: Path) -> tuple[str, str]:
     return begin, heading + rest
 
 
-def played(text: str, folder: Path) -> str:
+def play(text: str, folder: Path) -> str:
     """The page with what its commands and snippets print in this folder, which becomes the current one."""
     names: dict[str, Any] = {}
     printed = ""
@@ -41,14 +41,14 @@ def played(text: str, folder: Path) -> str:
         if found["file"]:
             (folder / found["file"]).write_text(found["content"], encoding="utf-8")
         elif found["kind"] in ("sh", "python"):
-            printed = _printed(found["kind"], found["content"], names)
+            printed = _run_block(found["kind"], found["content"], names)
         return found[0]
 
     with contextlib.chdir(folder), mock.patch.object(sys, "path", [str(folder), *sys.path]), terminal():
         return _BLOCK.sub(replaced, text)
 
 
-def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
+def _run_block(kind: str, content: str, names: dict[str, Any]) -> str:
     """Output of a block; of a command that fails its message, too."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -58,7 +58,7 @@ def _printed(kind: str, content: str, names: dict[str, Any]) -> str:
         else:
             lines = content.replace("\\\n", " ").splitlines()
             with _no_names_of_snippets():
-                failed = sum(called(shlex.split(line, comments=True)[1:]) for line in lines) > 0
+                failed = sum(call(shlex.split(line, comments=True)[1:]) for line in lines) > 0
     return without_spaces(out.getvalue() + (err.getvalue() if failed else "")) + "\n"
 
 
@@ -76,7 +76,7 @@ def main() -> None:
     for page in (page for page in PAGES if page.stem in wanted):
         text, rest = parts(page)
         with tempfile.TemporaryDirectory() as folder:
-            text = played(text, Path(folder))
+            text = play(text, Path(folder))
         page.write_text(text + rest, encoding="utf-8")
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import Bounds, choice, known_names, shortened
+from ikgym.validation import Bounds, choice, known_names, shorten
 
 #: Called with the name and the value of a field; returns the value, checked.
 Check = Callable[[str, Any], Any]
@@ -129,7 +129,7 @@ def check_instance(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
     """
     if not isinstance(value, kinds):
         wanted = " or ".join("a text" if kind is str else f"an object of {kind.__name__}" for kind in kinds)
-        raise InvalidInputError(f"{name}: expected {wanted}, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected {wanted}, got {shorten(value)}.")
     return value
 
 

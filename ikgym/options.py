@@ -20,7 +20,7 @@ from ikgym.validation import (
     known_names,
     number,
     one_a_row,
-    shortened,
+    shorten,
     whole_number,
 )
 
@@ -41,7 +41,7 @@ def checked_mask(mask: Any, rows: int) -> npt.NDArray[np.bool_]:
         return np.ones(rows, dtype=np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (rows,):
         raise InvalidInputError(
-            f"options['reset_mask']: expected a Boolean array of shape ({rows},), got {shortened(mask)}."
+            f"options['reset_mask']: expected a Boolean array of shape ({rows},), got {shorten(mask)}."
         )
     if not mask.any():
         raise InvalidInputError("options['reset_mask']: expected at least one true entry, got none.")
@@ -68,7 +68,7 @@ def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dic
     if options is None:
         return {}
     if not isinstance(options, dict):
-        raise InvalidInputError(f"options: expected None or a dict, got {shortened(options)}.")
+        raise InvalidInputError(f"options: expected None or a dict, got {shorten(options)}.")
     known_names("option of reset", options, known)
     return options
 
@@ -80,7 +80,7 @@ def take_actions(actions: npt.ArrayLike, shape: tuple[int, ...], active: BoolArr
     except ValueError:  # lists of different lengths
         raw = np.asarray(None)
     if raw.dtype.kind not in "fiub":
-        raise InvalidInputError(f"action: expected numbers of shape {shape}, got {shortened(actions)}.")
+        raise InvalidInputError(f"action: expected numbers of shape {shape}, got {shorten(actions)}.")
     if raw.shape != shape:
         raise InvalidInputError(f"action: expected shape {shape}, got {raw.shape}.")
     out[:] = raw
@@ -104,7 +104,7 @@ def checked_starts(q: npt.ArrayLike | None, rows: int, scenario: Scenario) -> Fl
     if (np.abs(starts) > bound).any():
         raise InvalidInputError(
             f"options['q']: expected absolute values of at most {np.round(bound, 4).tolist()} in [rad] or [m], "
-            f"got {shortened(starts.tolist())}."
+            f"got {shorten(starts.tolist())}."
         )
     return np.broadcast_to(starts, (rows, joints))
 

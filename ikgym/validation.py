@@ -61,14 +61,14 @@ def float_array(
             raise TypeError
         array = np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shortened(value)}.") from None
+        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shorten(value)}.") from None
     if shape is not None and not _fits(array.shape, shape):
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
         raise InvalidInputError(f"{name}: expected shape {wanted}, got {array.shape}.")
     if not np.isfinite(array).all():
-        raise InvalidInputError(f"{name}: expected finite numbers, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected finite numbers, got {shorten(value)}.")
     if at_most < math.inf and (np.abs(array) > at_most).any():
-        raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected absolute values of at most {at_most:g}, got {shorten(value)}.")
     if at_least > -math.inf and (array < at_least).any():
         i = int(np.argmax(array.ravel() < at_least))
         raise InvalidInputError(
@@ -129,7 +129,7 @@ def number(
     """A finite number within its bounds."""
     bound = _range(above, at_least, at_most, below)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected a finite number{bound}, got {shorten(value)}.")
     try:
         out = float(value)
     except OverflowError:  # a whole number beyond all floats
@@ -150,7 +150,7 @@ def whole_number(name: str, value: int, *, at_least: int, at_most: int | None = 
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or value < at_least or (at_most is not None and value > at_most):
         bounds = f"of at least {at_least}" if at_most is None else f"from {at_least} to {at_most}"
-        raise InvalidInputError(f"{name}: expected a whole number {bounds}, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected a whole number {bounds}, got {shorten(value)}.")
     return int(value)
 
 
@@ -167,7 +167,7 @@ def check_sizes(name: str, value: object) -> None:
             check_sizes(name, one)
     elif isinstance(value, (int, float)) and value != 0 and not SMALLEST <= abs(value) <= LARGEST:
         raise InvalidInputError(
-            f"{name}: expected 0, or an absolute value from {SMALLEST:g} to {LARGEST:g}, got {shortened(value)}."
+            f"{name}: expected 0, or an absolute value from {SMALLEST:g} to {LARGEST:g}, got {shorten(value)}."
         )
 
 
@@ -287,7 +287,7 @@ def different_texts(name: str, value: Any, count: int | None = None) -> tuple[st
     good = {one for one in texts if isinstance(one, str) and one}
     if not isinstance(value, (tuple, list)) or len(good) != len(texts) or count not in (None, len(texts)):
         many = "different texts" if count is None else f"{count} different texts"
-        raise InvalidInputError(f"{name}: expected {many}, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected {many}, got {shorten(value)}.")
     return texts
 
 
@@ -320,7 +320,7 @@ def _range(above: float | None, at_least: float | None, at_most: float | None, b
     return f" of at least {at_least:g}" if at_most is None else f" from {at_least:g} to {at_most:g}"
 
 
-def shortened(value: object, limit: int = 120) -> str:
+def shorten(value: object, limit: int = 120) -> str:
     """A value in one line for messages, truncated if it is long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= limit else text[: limit - 1] + "…"

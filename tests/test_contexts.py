@@ -54,7 +54,7 @@ def test_learners_are_trained_and_measured(tmp_path, monkeypatch):
     contexts.train("ppo_shown", 0, 2048)
     assert model.read_bytes() == written
     (tmp_path / "contexts.csv").write_text("policy,interpolation\nppo_history,7\nfilter_bank,4\n", encoding="utf-8")
-    lines = {line["policy"]: line for line in contexts.measured(only_new=True)}
+    lines = {line["policy"]: line for line in contexts.measure(only_new=True)}
     assert lines.keys() == {*contexts.POLICIES, "ppo_shown", "ppo_history"}
     told, shown = lines["told"], lines["ppo_shown"]
     assert (told["train"], told["interpolation"], told["extrapolation"], told["gap_closed"]) == (1.0, 1.0, 1.0, 1.0)

@@ -16,9 +16,9 @@ from baselines import cli, registry
 from baselines.cli import main
 from baselines.evaluate import evaluate
 from baselines.oracle import best_known
-from baselines.oracle.best_known import beaten
+from baselines.oracle.best_known import beaten_record
 from baselines.papers import PAPERS
-from docs.tables import PAGES, filled
+from docs.tables import PAGES, fill_in
 from docs.terminal import manual_of
 from docs.tutorial import PAGES as TUTORIALS
 
@@ -31,7 +31,7 @@ PROSE = [*ROOT.glob("*.md"), *WRITTEN]
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda page: str(page.relative_to(PAGES)))
 def test_tables_are_up_to_date(page):
     text = page.read_text(encoding="utf-8")
-    assert filled(text) == text, "write the tables anew with: python -m docs.tables"
+    assert fill_in(text) == text, "write the tables anew with: python -m docs.tables"
 
 
 def test_every_picture_and_every_table_of_results_is_shown():
@@ -196,7 +196,7 @@ def test_readme_tables_are_what_the_demo_prints(scenario):
     assert scenario in makefile
     rows = evaluate(scenario, re.search(r"^DEMO := (.*)$", makefile, re.MULTILINE)[1].split())
     assert list(shown) == [row.policy for row in sorted(rows, key=lambda row: row.total_cost)]
-    assert not any(map(beaten, rows)), f"write them down with: {best_known.UPDATE}"
+    assert not any(map(beaten_record, rows)), f"write them down with: {best_known.UPDATE}"
     for row in rows:
         # Where the path was lost, or nothing but rounding is left, another processor may print other digits.
         lost = row.position_error_max > 1.0

@@ -48,12 +48,12 @@ def table(tmp_path, monkeypatch):
 
 def test_new_lines_are_measured_and_the_others_stay(table):
     table("some", HEAD + "mine,varga7-fast,1,1,7.5,3,no\nbroyden,varga7-fast,1,1,0.5,4,yes\ndls,varga7-fast,1,1,,,\n")
-    low, new, high = measure.measured("some", only_new=True)
+    low, new, high = measure.measure_lines("some", only_new=True)
     assert (low["policy"], low["cost_ratio"], low["time_p99_us"]) == ("broyden", "0.5", "4")
     assert (high["policy"], high["cost_ratio"]) == ("mine", "7.5")
     assert new["policy"] == "dls"
     assert new["cost_ratio"] == pytest.approx(1.9148, rel=1e-4)
-    every = {one["policy"]: one for one in measure.measured("some")}
+    every = {one["policy"]: one for one in measure.measure_lines("some")}
     assert float(every["broyden"]["cost_ratio"]) > 1.0
     assert every["dls"]["time_p99_us"] > 0.0
     assert every["mine"]["cost_ratio"] == "7.5"
@@ -64,7 +64,7 @@ def test_costs_relative_to_the_lowest_are_measured_together(table):
     head = "period_ms,policy,scenario,episodes,relative_to,cost_ratio,error_mm\n"
     here = "varga7-fast at 2 ms,1,lowest in the table"
     table("some", f"{head}2,qp,{here},7.5,\n2,dls,{here},,\n")
-    best, other = measure.measured("some", only_new=True)
+    best, other = measure.measure_lines("some", only_new=True)
     assert (best["cost_ratio"], best["period_ms"], best["scenario"]) == (1.0, "2", "varga7-fast at 2 ms")
     assert 1.0 < other["cost_ratio"] != 7.5
     assert best["error_mm"] > 0.0
@@ -74,7 +74,7 @@ def test_a_label_stands_for_a_policy(table):
     """With noise seeds, too."""
     head = "policy,scenario,episodes,noise_seeds,cost_ratio,low,high,spec\n"
     table("some", f'{head}mine,panda-field,2,2,,,,dls:gain=0.5\nother,panda-bus,2,1,1.5,1.4,1.6,"qp:gain=0.5"\n')
-    new, old = measure.measured("some", only_new=True)
+    new, old = measure.measure_lines("some", only_new=True)
     assert (new["policy"], new["spec"]) == ("mine", "dls:gain=0.5")
     assert 1.0 < new["low"] < new["cost_ratio"] < new["high"]
     assert old["cost_ratio"] == "1.5"

@@ -86,9 +86,9 @@ def test_the_landing_page_shows_the_replay_or_says_that_there_is_none(tmp_path, 
     from docs.site import replay
 
     landing = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
-    assert "built without" in replay.placed(landing, there=False)
-    assert "<iframe" not in replay.placed(landing, there=False)
-    assert f'src="{replay.PAGE}"' in replay.placed(landing, there=True)
+    assert "built without" in replay.place_report(landing, there=False)
+    assert "<iframe" not in replay.place_report(landing, there=False)
+    assert f'src="{replay.PAGE}"' in replay.place_report(landing, there=True)
     settings = load_config(str(ROOT / "mkdocs.yml"), extra={"report": "results/none/report.html"})
     with caplog.at_level("INFO", logger="mkdocs"):
         assert replay.file(settings) is None

@@ -5,7 +5,16 @@ import pytest
 
 import ikgym
 from ikgym.obstacles import Box, Capsule, HalfSpace, Sphere
-from ikgym.obstacles.solids import bounded, closest, in_space, link_frames, on_links, outline, solids_of, surface
+from ikgym.obstacles.solids import (
+    closest,
+    cut_half_spaces,
+    in_space,
+    link_frames,
+    on_links,
+    outline,
+    solids_of,
+    surface,
+)
 from tests.bodied import AROUND, crowd
 
 #: Half edges and radius, and the volume of the solid in [m³].
@@ -80,7 +89,7 @@ def test_the_closest_points_are_on_both_surfaces():
     gap = found.points[:, 0] - found.points[:, 1]
     np.testing.assert_allclose(np.linalg.norm(gap, axis=1), np.abs(found.distances), atol=1e-12)
     for row, (first, second) in enumerate(found.pairs):
-        others = found.bodies[row] if second < len(arm.bodies) else bounded(rows[row], 9.0)
+        others = found.bodies[row] if second < len(arm.bodies) else cut_half_spaces(rows[row], 9.0)
         solids = found.bodies[row, first], others[second % len(arm.bodies)]
         for solid, point in zip(solids, found.points[row], strict=True):
             own = (point - solid[9:12]) @ solid[:9].reshape(3, 3)
@@ -103,7 +112,7 @@ def test_where_nothing_can_meet_there_is_no_pair():
 
 def test_half_spaces_are_plates_beside_a_point():
     rows = np.array([HalfSpace("wall", [0.5, 3, 4], [1, 0, 0]).numbers(), Sphere("ball", [1, 2, 3], 0.1).numbers()])
-    wall, ball = bounded(rows, 0.7, [0.1, 0.2, 0.3])
+    wall, ball = cut_half_spaces(rows, 0.7, [0.1, 0.2, 0.3])
     np.testing.assert_allclose(wall[9:], [0.5, 0.2, 0.3, 0.7, 0.7, 0.0, 0.0])
     np.testing.assert_array_equal(ball, rows[1])
     vertices, _ = surface(wall[12:])

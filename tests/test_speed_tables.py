@@ -11,7 +11,7 @@ from docs.timing import medians
 PANDA = ikgym.arms.get("panda")
 
 
-@pytest.mark.parametrize("measured", [lambda: environments.measured((3,), rounds=1, seconds=0.0), kinematics.measured])
+@pytest.mark.parametrize("measured", [lambda: environments.measure((3,), rounds=1, seconds=0.0), kinematics.measure])
 def test_tables_of_medians(measured):
     table = measured()
     assert len(table) >= 4
@@ -19,7 +19,7 @@ def test_tables_of_medians(measured):
 
 
 def test_calls_of_a_library_are_parts_of_predict():
-    table = calls.measured(steps=3, turns=1)
+    table = calls.measure(steps=3, turns=1)
     assert [line["policy"] for line in table] == [policy for policy, *_ in calls.CASES]
     for line in table:
         assert (line["library_us"] is not None) == (line["policy"] in ("pink", "mink"))

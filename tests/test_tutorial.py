@@ -8,7 +8,7 @@ import pytest
 
 import baselines
 from baselines import registry
-from docs.tutorial import PAGES, parts, played
+from docs.tutorial import PAGES, parts, play
 
 #: Pages that take longer; the options of their commands are looked at with those of all pages.
 LONGER = {"README", "reproducing", "training", "wrong_models"}
@@ -53,7 +53,7 @@ def test_it_runs_and_prints_what_the_page_says(page, tmp_path):
     if page.stem == "training":
         pytest.importorskip("torch")
     said, _ = parts(page)
-    text = played(said, tmp_path)
+    text = play(said, tmp_path)
     assert not differences(text, said), REMEDY
     if page.stem == "tutorial":
         exported = sorted(file.name for file in (tmp_path / "results" / "export" / "weld").iterdir())
@@ -63,7 +63,7 @@ def test_it_runs_and_prints_what_the_page_says(page, tmp_path):
 def test_a_page_that_says_something_else_is_noticed(tmp_path):
     block = "```python\nprint(x, 20.5, 'words')\n```\n\n```text\n7 20.5 words\n```\n"
     page = f"```python\nx = 7\n```\n\n{block}"
-    assert not differences(played(page, tmp_path), page)
+    assert not differences(play(page, tmp_path), page)
     for wrong in ("8 20.5 words", "7 20.9 words", "7 20.5 word", "7 20.5 words too", "7 20.5"):
         changed = page.replace("7 20.5 words\n", f"{wrong}\n")
-        assert differences(played(changed, tmp_path), changed), wrong
+        assert differences(play(changed, tmp_path), changed), wrong

@@ -125,10 +125,10 @@ def load_agent(file: pathlib.Path) -> AgentFile:
         ResultsError: There is no such file, it is damaged, or it has another format.
     """
     with reading(file):
-        return _parsed(str(file), read_bytes(file, MOST_BYTES))
+        return _parse(str(file), read_bytes(file, MOST_BYTES))
 
 
-def _parsed(source: str, content: bytes) -> AgentFile:
+def _parse(source: str, content: bytes) -> AgentFile:
     """The agent in the content of a file."""
     tensors = load(content)
     header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])

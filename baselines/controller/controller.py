@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.controller import kernels
-from baselines.controller.drives import IDENTIFY, LONGEST, Drives, drives_of, identified, policy_for
+from baselines.controller.drives import IDENTIFY, LONGEST, Drives, drives_of, identified_drives, policy_for
 from baselines.controller.guards import Guards, StopReason
 from baselines.controller.reference import Pose, coordinates, coordinates_ahead, numbers, obstacle_rows
 from baselines.controller.timing import Timing, timing_of
@@ -28,7 +28,7 @@ from ikgym.kernels.tasks import pose_rows
 from ikgym.obstacles import Obstacle
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import furthest, offsets
-from ikgym.validation import FloatArray, shortened, whole_number
+from ikgym.validation import FloatArray, shorten, whole_number
 
 logger = logging.getLogger("ikgym")
 
@@ -87,7 +87,7 @@ class Controller:
         steps: int | None = None,
     ) -> None:
         if guards is not None and not isinstance(guards, Guards):
-            raise InvalidInputError(f"guards: expected Guards(…) or None, got {shortened(guards)}.")
+            raise InvalidInputError(f"guards: expected Guards(…) or None, got {shorten(guards)}.")
         self._scenario, self._guards = scenarios.find(scenario), Guards() if guards is None else guards
         drives = drives_of(drives, self._scenario)
         self.policy = policy_for(self._scenario, policy, drives, self._guards)
@@ -165,8 +165,8 @@ class Controller:
         measured = numbers("q", q, (self._joints,))
         report = self._report(commanded, commanded_acceleration)
         speed = None if qdot is None else self._speed(qdot)
-        seen, ahead = self._seen(pose, measured), coordinates_ahead(self._problem.task, reference)
-        nominal = ahead if len(ahead) == self._shown else self._wanted(ahead)
+        seen, ahead = self._observe_pose(pose, measured), coordinates_ahead(self._problem.task, reference)
+        nominal = ahead if len(ahead) == self._shown else self._select_poses(ahead)
         ages, solids = (_age("q_age", q_age), _age("pose_age", pose_age)), self._obstacles(obstacles)
         taken = report is None or kernels.take_report(*report, *self._takes, self._last, self._moved)
         if not taken:
@@ -186,9 +186,9 @@ class Controller:
                 if commanded_acceleration is None:
                     self._moved[:] = 0.0
             if reason == 0:
-                return self._commanded(measured, speed, seen, nominal, ages, solids)
+                return self._compute_command(measured, speed, seen, nominal, ages, solids)
             self._stopped = StopReason(reason)
-        return self._braked()
+        return self._brake()
 
     def warm_up(self, calls: int = WARM_UP) -> Timing:
         """Compiles, and plays the scenario's reference on a perfect arm; then begins anew.
@@ -217,7 +217,7 @@ class Controller:
         """The drives as given, or as identified; None while there is no evidence of them."""
         if self._given is not None or self._state is None:
             return self._given
-        return identified(self.policy.diagnostics(self._state), self._problem.dt)
+        return identified_drives(self.policy.diagnostics(self._state), self._problem.dt)
 
     @property
     def ahead(self) -> int:
@@ -263,7 +263,7 @@ class Controller:
             raise InvalidInputError("obstacles: expected none, since no obstacle of the scenario moves or is drawn.")
         return None
 
-    def _seen(self, pose: Pose | None, q: FloatArray) -> FloatArray:
+    def _observe_pose(self, pose: Pose | None, q: FloatArray) -> FloatArray:
         """Task coordinates of the measured pose, or of the model's at q. Shape (m,)."""
         if pose is not None:
             return coordinates("pose", self._problem.task, pose)
@@ -271,7 +271,7 @@ class Controller:
         pose_rows(self._problem.model.chain, self._kind, q[None], out)
         return out.ravel()
 
-    def _wanted(self, nominal: FloatArray) -> FloatArray:
+    def _select_poses(self, nominal: FloatArray) -> FloatArray:
         """The poses that the policy looks at, of those ahead. Shapes (p, m)."""
         if len(nominal) < self.ahead:
             raise InvalidInputError(
@@ -280,7 +280,7 @@ class Controller:
         preview = self.policy.preview
         return nominal[:preview] if isinstance(preview, int) else nominal[np.array(preview) - 1]
 
-    def _commanded(
+    def _compute_command(
         self,
         q: FloatArray,
         qdot: FloatArray,
@@ -302,17 +302,17 @@ class Controller:
         except Exception:
             logger.exception("The policy %s raised an error: the arm is stopped.", self.policy.name)
             self._stopped = StopReason.POLICY
-            return self._braked()
+            return self._brake()
         if self._state[0][0] == _DIVERGED:
             self._stopped = StopReason.POLICY
-            return self._braked()
+            return self._brake()
         self._made += 1
         out = np.empty_like(q)
         before = self._last, self._moved
         kernels.command(self._limits, q, action[0], self._unit, *before, self._problem.dt, self._kept, out)
         return out
 
-    def _braked(self) -> FloatArray:
+    def _brake(self) -> FloatArray:
         """The next command of a stop. Shape (n,)."""
         out = np.empty_like(self._last)
         kernels.brake(self._change, self._limits[JERK], self._last, self._moved, out)
@@ -349,7 +349,7 @@ class Controller:
         """How to begin a motion whose reference is farther from the arm than the guards allow."""
         if self._stopped is not StopReason.PATH_ERROR:
             return ""
-        distance, angle = kernels.errors(self._kind, nominal, self._seen(None, start))
+        distance, angle = kernels.errors(self._kind, nominal, self._observe_pose(None, start))
         return (
             f" The arm starts {distance:.3g} m and {angle:.3g} rad from the reference: begin on it, or allow more with "
             "guards=Guards(position_error=…, orientation_error=…)."
@@ -357,8 +357,8 @@ class Controller:
 
     def _touch(self) -> None:
         """Compiles kernels that the first periods may not call: poses as rotation and position, and a stop."""
-        self._seen((np.eye(3), np.zeros(3)), np.zeros(self._joints))
-        self._braked()
+        self._observe_pose((np.eye(3), np.zeros(3)), np.zeros(self._joints))
+        self._brake()
         kernels.take_report(np.zeros(self._joints), _NONE, *self._takes, self._last, self._moved)
 
 

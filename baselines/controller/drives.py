@@ -21,7 +21,7 @@ from ikgym.frozen import Frozen
 from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.plant.identified import IdentifiedPlant
 from ikgym.scenarios import Scenario
-from ikgym.validation import LARGEST, FloatArray, per_joint, shortened
+from ikgym.validation import LARGEST, FloatArray, per_joint, shorten
 
 #: Drives that are to be identified.
 IDENTIFY = "identify"
@@ -153,14 +153,14 @@ def policy_for(
     """
     if not isinstance(drives, Drives) and drives != IDENTIFY:
         raise InvalidInputError(
-            f"drives: expected Drives(…), {IDENTIFY!r} or a file that ends in .toml, got {shortened(drives)}."
+            f"drives: expected Drives(…), {IDENTIFY!r} or a file that ends in .toml, got {shorten(drives)}."
         )
     if isinstance(policy, SolverPolicy):
         _check(policy, scenario)
     perfect = isinstance(drives, Drives) and drives.perfect
     if perfect and isinstance(policy, SolverPolicy):
         return policy
-    name, parameters = _named(policy)
+    name, parameters = _name_and_parameters(policy)
     inside = any(kind.name == PREDICTED for kind in policies_in((name, parameters)))
     if inside and isinstance(drives, Drives) and not perfect:
         raise InvalidInputError(f"drives: {name} predicts by itself; give it delay and bandwidth, got {drives}.")
@@ -174,7 +174,7 @@ def policy_for(
     return registry.make(PREDICTED, scenario.replace(model=model), **options)
 
 
-def identified(diagnostics: Mapping[str, FloatArray], dt: float) -> IdentifiedDrives | None:
+def identified_drives(diagnostics: Mapping[str, FloatArray], dt: float) -> IdentifiedDrives | None:
     """The drives that a policy has identified; None while there is no evidence, or it identifies none.
 
     Args:
@@ -190,7 +190,7 @@ def identified(diagnostics: Mapping[str, FloatArray], dt: float) -> IdentifiedDr
     return IdentifiedDrives(*(tuple(array.tolist()) for array in (delay, constant, moved, at_least)))
 
 
-def _named(policy: PolicySpec | SolverPolicy) -> tuple[str, dict[str, Any]]:
+def _name_and_parameters(policy: PolicySpec | SolverPolicy) -> tuple[str, dict[str, Any]]:
     if not isinstance(policy, SolverPolicy):
         return parse_policy(policy)
     name = registry.name_of(type(policy))

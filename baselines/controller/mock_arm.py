@@ -135,7 +135,7 @@ class ArmInterface:
         else:
             self._missed, wanted = 0, command.copy()
         if self._reflex is None:
-            self._reflex = self._refused(wanted)
+            self._reflex = self._find_reflex(wanted)
         if self._reflex is not None:  # brakes as hard as it can
             most = np.minimum(self._bounds[1], np.abs(self._command))
             wanted = self._command - np.copysign(most, self._command)
@@ -155,7 +155,7 @@ class ArmInterface:
         self._periods += 1
         return self.state
 
-    def _refused(self, wanted: FloatArray) -> Reflex | None:
+    def _find_reflex(self, wanted: FloatArray) -> Reflex | None:
         """The reflex that a command starts; None if it is fine."""
         if self._missed > MOST_LOST:
             return Reflex.COMMUNICATION

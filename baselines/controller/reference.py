@@ -14,7 +14,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.outcome import OBSTACLE
 from ikgym.obstacles import Obstacle
 from ikgym.tasks import Task
-from ikgym.validation import FloatArray, shortened
+from ikgym.validation import FloatArray, shorten
 
 #: Task coordinates, or rotation and position.
 Pose = npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]
@@ -29,7 +29,7 @@ def numbers(name: str, value: Any, shape: tuple[int | None, ...]) -> FloatArray:
     try:
         array = as_floats(value)
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shortened(value)}.") from None
+        raise InvalidInputError(f"{name}: expected an array of real numbers, got {shorten(value)}.") from None
     given = array.shape
     if given != shape and (
         len(given) != len(shape) or any(w not in {None, n} for n, w in zip(given, shape, strict=True))
@@ -53,7 +53,7 @@ def coordinates(name: str, task: Task, pose: Any) -> FloatArray:
     if not is_pair(pose):
         return numbers(name, pose, (task.size,))
     rotation, position = numbers(name, pose[0], (3, 3)), numbers(name, pose[1], (3,))
-    return _converted(task, rotation[None], position[None]).ravel()
+    return _convert(task, rotation[None], position[None]).ravel()
 
 
 def coordinates_ahead(task: Task, reference: Any) -> FloatArray:
@@ -69,7 +69,7 @@ def coordinates_ahead(task: Task, reference: Any) -> FloatArray:
     if not is_pair(reference):
         return numbers("reference", reference, (None, task.size))
     rotations = numbers("reference", reference[0], (None, 3, 3))
-    return _converted(task, rotations, numbers("reference", reference[1], (len(rotations), 3)))
+    return _convert(task, rotations, numbers("reference", reference[1], (len(rotations), 3)))
 
 
 def obstacle_rows(obstacles: npt.ArrayLike | Sequence[Obstacle] | None, count: int) -> FloatArray:
@@ -89,7 +89,7 @@ def obstacle_rows(obstacles: npt.ArrayLike | Sequence[Obstacle] | None, count: i
     return numbers("obstacles", obstacles, (count, OBSTACLE))
 
 
-def _converted(task: Task, rotations: FloatArray, positions: FloatArray) -> FloatArray:
+def _convert(task: Task, rotations: FloatArray, positions: FloatArray) -> FloatArray:
     out: FloatArray = np.empty((len(rotations), task.size))
     convert(task.kind, rotations, positions, out)
     return out

@@ -205,10 +205,10 @@ def _play_all(jobs: Sequence[Job], workers: Workers | None, bar: _Bar) -> Genera
 
 def _play_away(away: Sequence[Batch], workers: Workers, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
     """Plays batches by workers."""
-    from baselines.workers import WorkerError, finished
+    from baselines.workers import WorkerError, run_units
 
     check_picklable({batch[0].specification: None for batch in away})
-    with contextlib.closing(finished(play, away, workers)) as all_done:
+    with contextlib.closing(run_units(play, away, workers)) as all_done:
         for batch, future in all_done:
             bar.announce(batch)
             bar.update(sum(job.scenario.steps for job in batch))

@@ -211,7 +211,7 @@ def _label_episodes(rows: Iterable[Row]) -> pd.DataFrame:
     rows = Rows(rows)
     out = rows.frame().assign(
         text=[canonical(row.parameters) for row in rows],
-        beaten=[row.seed if best_known.beaten(row) else np.nan for row in rows],
+        beaten=[row.seed if best_known.beaten_record(row) else np.nan for row in rows],
         stopped=[np.nan if row.clearance_min is None else float(row.stopped is not None) for row in rows],
     )
     for scenario, contents in out.groupby("scenario", sort=False)[["fingerprint", "test_set"]]:

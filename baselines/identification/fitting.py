@@ -126,7 +126,7 @@ def _latency(lag: Lag, period: float) -> float:
     return lag.delay + 1.0 / _share(period, lag.time_constant) - 1.0
 
 
-def _lagged(part: Part, whole: int, constant: float) -> FloatArray:
+def _lag_commands(part: Part, whole: int, constant: float) -> FloatArray:
     """Commands behind a lag, whole periods late and one more. Shape (k, 2)."""
     share = _share(part.period, constant)
     out = lfilter([share], [1.0, share - 1.0], part.u)
@@ -135,7 +135,7 @@ def _lagged(part: Part, whole: int, constant: float) -> FloatArray:
 
 def _taps(part: Part, whole: int, constant: float, where: FloatArray) -> tuple[FloatArray, float]:
     """The best b₀ and b₁ of at least 0, and the sum of squares that they leave in some rows."""
-    columns, y = _lagged(part, whole, constant), part.y
+    columns, y = _lag_commands(part, whole, constant), part.y
     if where is not part.everything:
         columns, y = columns[where], y[where]
     square, mixed = columns.T @ columns, columns.T @ y
@@ -158,7 +158,7 @@ def _coarse(part: Part, constant: float, lowest: int, longest: int, where: Float
     return float(y @ y) - max(products[whole], 0.0) ** 2 / max(power, 1e-300), lowest + whole, constant
 
 
-def _refined(part: Part, whole: int, guess: float, where: FloatArray) -> tuple[float, int, float]:
+def _residuals_around(part: Part, whole: int, guess: float, where: FloatArray) -> tuple[float, int, float]:
     """Residuals of a whole delay and the next one, around a guess of the time constant."""
     none = _taps(part, whole, 0.0, where)[1]
     middle = math.log(max(guess, FASTEST))
@@ -180,7 +180,7 @@ def fit_lag(part: Part, where: Any = None, lowest: int = 0) -> Lag:
     near: dict[int, tuple[float, int, float]] = {}
     while whole - 1 not in near or whole + 1 not in near:  # down the valley of delays
         for step in range(max(lowest, whole - 1), whole + 2):
-            near.setdefault(step, _refined(part, step, guess, where))
+            near.setdefault(step, _residuals_around(part, step, guess, where))
         near.setdefault(lowest - 1, (math.inf, lowest - 1, 0.0))
         _, whole, guess = min(near.values())
     constant = near[whole][2]
@@ -194,7 +194,7 @@ def simulate_lag(part: Part, lag: Lag) -> FloatArray:
     """Output of a lag, filtered. Shape (k,)."""
     whole = math.floor(lag.delay)
     rest = lag.delay - whole
-    out: FloatArray = lag.gain * _lagged(part, whole, lag.time_constant) @ np.array([1.0 - rest, rest])
+    out: FloatArray = lag.gain * _lag_commands(part, whole, lag.time_constant) @ np.array([1.0 - rest, rest])
     return out
 
 

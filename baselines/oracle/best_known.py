@@ -2,7 +2,7 @@
 
 They lie in `baselines/data/best_known.json`, one record a line. A record belongs to the content of its episode, see
 :func:`baselines.fingerprints.episode_hash`: where scenario, steps or cost have changed since it is none. The episode is
-that of :func:`baselines.oracle.stripped.stripped`, so that scenarios in which the same arm moves share their records.
+that of :func:`baselines.oracle.stripped.strip_plant`, so that scenarios in which one arm moves share their records.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Protocol
 
 from baselines.files import ResultsError, from_json, locked, read_json, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
-from baselines.oracle.stripped import stripped
+from baselines.oracle.stripped import strip_plant
 from ikgym.scenarios import Scenario
 
 #: Scenario and reset seed.
@@ -83,12 +83,12 @@ def lookup(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Record
 
     ``arm_seed`` says which arm moves; that of the seed if left out.
     """
-    return _lookup(stripped(scenario, seed, arm_seed), seed)
+    return _lookup(strip_plant(scenario, seed, arm_seed), seed)
 
 
 def cost(scenario: Scenario, seed: int, arm_seed: int | None = None) -> float | None:
     """The best known cost that a cost ratio is stated against; None where there is none, or none above 1e-9."""
-    return _stated(lookup(scenario, seed, arm_seed))
+    return _usable_cost(lookup(scenario, seed, arm_seed))
 
 
 def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
@@ -96,10 +96,10 @@ def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
     if not scenario.plant.ideal:
         return [cost(scenario, seed) for seed in seeds]
     content = fingerprint(scenario)
-    return [_stated(_lookup(content, seed)) for seed in seeds]
+    return [_usable_cost(_lookup(content, seed)) for seed in seeds]
 
 
-def beaten(row: Scored) -> Record | None:
+def beaten_record(row: Scored) -> Record | None:
     """The record that a row's cost lies below, by more than rounding; None where it does not."""
     known = _lookup(row.fingerprint, row.seed)
     if known is None or known.cost <= MEANINGLESS or not row.total_cost < known.cost * (1.0 - MARGIN):
@@ -160,7 +160,7 @@ def _lookup(content: Scenario | str, seed: int) -> Record | None:
     return _read(DATA).by_hash.get(episode_hash(content, seed))
 
 
-def _stated(known: Record | None) -> float | None:
+def _usable_cost(known: Record | None) -> float | None:
     return None if known is None or known.cost <= MEANINGLESS else known.cost
 
 

@@ -18,7 +18,7 @@ from baselines.files import ResultsError, canonical, from_json, read_arrays, rea
 from baselines.fingerprints import episode_hash, fingerprint
 from baselines.oracle.optimum import Optimum, Search, Start
 from baselines.oracle.search import VERSION, polish, search
-from baselines.oracle.stripped import ideal, stripped
+from baselines.oracle.stripped import ideal, strip_plant
 from ikgym import scenarios
 from ikgym.kernels.kinematics import add_arm_axis
 from ikgym.scenarios import Scenario
@@ -68,10 +68,10 @@ def solve(
     scenario = scenario if isinstance(scenario, Scenario) else scenarios.get(scenario)
     seed, how = whole_number("seed", seed, at_least=0), how or Search()
     on_disk = cached and not paths
-    known = kept(scenario, seed, how, arm_seed) if on_disk else None
+    known = read_cached(scenario, seed, how, arm_seed) if on_disk else None
     if known is not None:
         return known
-    true, plain = stripped(scenario, seed, arm_seed), ideal(scenario, seed)
+    true, plain = strip_plant(scenario, seed, arm_seed), ideal(scenario, seed)
     if fingerprint(true) == fingerprint(plain):
         optimum = search(true, seed, how, tick, paths)
     else:
@@ -79,21 +79,21 @@ def solve(
         start = plain.shift_start(best, add_arm_axis(true.arm.chain))  # a third of the Newton steps from `best` itself
         optimum = polish(true, seed, {IDEAL: start, **(paths or {})})
     if on_disk:
-        keep(optimum, scenario, seed, how, arm_seed)
+        write_cached(optimum, scenario, seed, how, arm_seed)
     return optimum
 
 
-def kept(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> Optimum | None:
+def read_cached(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> Optimum | None:
     """The optimum of an episode on disk, see :func:`solve`; None if there is none."""
     known = _read(file_of(scenario, seed, how, arm_seed))
     # The name is not part of the content.
     return None if known is None else known.replace(scenario=scenario.name)
 
 
-def keep(optimum: Optimum, scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> None:
-    """Writes an optimum where :func:`kept` looks for it; where that cannot be done, a warning says so."""
+def write_cached(optimum: Optimum, scenario: Scenario, seed: int, how: Search, arm_seed: int | None = None) -> None:
+    """Writes an optimum where :func:`read_cached` looks for it; where that cannot be done, a warning says so."""
     try:
-        write(file_of(scenario, seed, how, arm_seed), _packed(optimum))
+        write(file_of(scenario, seed, how, arm_seed), _pack(optimum))
     except ResultsError as e:
         logger.warning("The optimum is not kept: %s", e)
 
@@ -117,12 +117,12 @@ def file_of(scenario: Scenario, seed: int, how: Search, arm_seed: int | None = N
 
     Where the arm is not that of the data sheet, the content is that of the episode with an ideal plant, too.
     """
-    episodes = [episode_hash(one, seed) for one in (stripped(scenario, seed, arm_seed), ideal(scenario, seed))]
+    episodes = [episode_hash(one, seed) for one in (strip_plant(scenario, seed, arm_seed), ideal(scenario, seed))]
     what = canonical([*dict.fromkeys(episodes), dataclasses.asdict(how), VERSION])
     return folder() / "oracle" / f"{hashlib.sha256(what.encode()).hexdigest()[:24]}.npz"
 
 
-def _packed(optimum: Optimum) -> bytes:
+def _pack(optimum: Optimum) -> bytes:
     plain = {f.name: getattr(optimum, f.name) for f in dataclasses.fields(optimum)}
     arrays = {name: plain.pop(name) for name in ("q", "qdot")}
     plain["starts"] = [dataclasses.asdict(start) for start in optimum.starts]

@@ -128,7 +128,7 @@ class EpisodeProblem:
         length, velocity = (np.add.reduceat(values, first) for values in (self.grid.length, self.grid.velocity))
         return Grid(self.grid.at[ends], length, tracking, velocity)
 
-    def refined(self, grid: Grid, path: FloatArray) -> FloatArray:
+    def refine(self, grid: Grid, path: FloatArray) -> FloatArray:
         """A path through the knots of a coarse grid at all knots. Shape (K, n)."""
         fine, knots = np.cumsum(self.grid.length), np.append(0.0, np.cumsum(grid.length))
         q = np.vstack([self.start, path])

@@ -93,7 +93,7 @@ class Optimum(Frozen):
     @property
     def found_by(self) -> str:
         """Kinds of starts that led there, to within a millionth of the cost."""
-        return "; ".join(dict.fromkeys(one.kind for one in self.starts if self._reached(one)))
+        return "; ".join(dict.fromkeys(one.kind for one in self.starts if self._is_reached_by(one)))
 
     @property
     def spread(self) -> dict[str, float]:
@@ -108,7 +108,7 @@ class Optimum(Frozen):
         first = [one.coarse for one in self.starts if one.coarse is not None and one.kind != LOCAL_SEARCH]
         out: dict[str, float] = {
             "polished": sum(one.cost is not None for one in self.starts),
-            "polished_within_1e-6": sum(map(self._reached, self.starts)),
+            "polished_within_1e-6": sum(map(self._is_reached_by, self.starts)),
         }
         if known := [one.cost for one in self.starts if one.cost is not None and one.kind not in SEARCHED]:
             out["without_search"] = min(known)
@@ -125,5 +125,5 @@ class Optimum(Frozen):
         """As a record of the best known costs."""
         return Record(self.scenario, self.seed, self.cost, self.found_by, self.gradient_norm, self.spread, self.hash)
 
-    def _reached(self, start: Start) -> bool:
+    def _is_reached_by(self, start: Start) -> bool:
         return start.cost is not None and start.cost <= max(self.cost * (1.0 + MARGIN), MEANINGLESS)

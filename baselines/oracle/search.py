@@ -65,7 +65,7 @@ def search(
     if episode.grid.velocity.any():
         starts, found = _coarse_search(episode, how, known, done)
         fine |= found
-    return finished(episode, starts, fine, done)
+    return polish_best(episode, starts, fine, done)
 
 
 def _known_paths(episode: EpisodeProblem, others: bool) -> dict[str, FloatArray]:
@@ -104,7 +104,7 @@ def _coarse_search(
     in_chunks(
         lambda first, last: local_search.random_paths(problem, how.seed, drawn, first + 1, last + 1), how.starts, GRAIN
     )
-    (costs, _), _ = improved(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
+    (costs, _), _ = improve(episode, grid, paths, NewtonSettings(False, local_search.STEPS, local_search.PRECISION))
     done(0.3)
 
     chosen = _distinct(costs, PARTNERS)
@@ -124,7 +124,7 @@ def _coarse_search(
     kinds = [*known, *[RANDOM] * how.starts, *[LOCAL_SEARCH] * int(better.sum())]
     starts = [Start(kind, cost) for kind, cost in zip(kinds, costs.tolist(), strict=True)]
     best = [number for number in _distinct(costs, how.polished) if number >= len(known)]
-    return starts, {number: episode.refined(grid, paths[number]) for number in best}
+    return starts, {number: episode.refine(grid, paths[number]) for number in best}
 
 
 def _distinct(costs: FloatArray, most: int) -> list[int]:
@@ -148,10 +148,10 @@ def polish(scenario: Scenario, seed: int, paths: Mapping[str, FloatArray]) -> Op
     """
     episode = EpisodeProblem.of(scenario, seed)
     given = [episode.feasible(episode.through(path)) for path in paths.values()]
-    return finished(episode, [Start(name) for name in paths], dict(enumerate(given)))
+    return polish_best(episode, [Start(name) for name in paths], dict(enumerate(given)))
 
 
-def finished(
+def polish_best(
     episode: EpisodeProblem,
     starts: Sequence[Start],
     paths: Mapping[int, FloatArray],
@@ -162,8 +162,8 @@ def finished(
     The paths (K, n) lie within the limits, and have the numbers of the starts that led to them.
     """
     polished = np.stack(list(paths.values()))
-    gains, spent = improved(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
-    played = [_played(episode, path) for path in polished]
+    gains, spent = improve(episode, episode.grid, polished, NewtonSettings(True, MOST_STEPS, TOLERANCE))
+    played = [_play(episode, path) for path in polished]
     gradients, reached = gains.gradients * episode.scenario.dt, list(starts)
     for number, (_, _, cost) in zip(paths, played, strict=True):
         reached[number] = dataclasses.replace(reached[number], cost=cost)
@@ -183,7 +183,7 @@ def finished(
     )
 
 
-def improved(
+def improve(
     episode: EpisodeProblem, grid: Grid, paths: FloatArray, settings: NewtonSettings
 ) -> tuple[local_search.Improved, float]:
     """Improves paths in place, in several threads; gives the improved ones, and the CPU time in [s]."""
@@ -199,7 +199,7 @@ def improved(
     return out, sum(spent)
 
 
-def _played(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _play(episode: EpisodeProblem, path: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Joint coordinates and joint velocities of each step, and their cost in the environment."""
     limit = episode.scenario.largest_qdot
     # Multipliers keep limits to rounding; the remainders would add up from step to step.

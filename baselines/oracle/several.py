@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator, Sequence
 from baselines import registry
 from baselines.episodes import Seeds
 from baselines.oracle.best_known import MEANINGLESS
-from baselines.oracle.cache import keep, kept, solve
+from baselines.oracle.cache import read_cached, solve, write_cached
 from baselines.oracle.episode import EpisodeProblem, path_of
 from baselines.oracle.optimum import Optimum, Search
-from baselines.oracle.stripped import stripped
+from baselines.oracle.stripped import strip_plant
 from baselines.policy import SolverPolicy
 from baselines.registry import parse_policy
-from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, finished
+from baselines.workers import ALONE, TOLERANCE, WorkerError, Workers, run_units
 from ikgym.scenarios import Scenario
 
 
@@ -48,8 +48,8 @@ def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> 
         InvalidInputError: A policy does not suit the scenario, or the scenario cannot be searched.
     """
     scenario, draw = wanted.scenario, wanted.draw
-    true = stripped(scenario, draw.seed, draw.arm_seed)
-    paths = {spec: path_of(_made(true, spec), true, draw.seed) for spec in wanted.policies}
+    true = strip_plant(scenario, draw.seed, draw.arm_seed)
+    paths = {spec: path_of(_make_policy(true, spec), true, draw.seed) for spec in wanted.policies}
     return solve(scenario, draw.seed, wanted.how, arm_seed=draw.arm_seed, cached=wanted.cached, tick=tick, paths=paths)
 
 
@@ -74,12 +74,12 @@ def find_all(
     left = []
     for one in wanted:
         on_disk = one.cached and not one.policies
-        known = kept(one.scenario, one.draw.seed, one.how, one.draw.arm_seed) if on_disk else None
+        known = read_cached(one.scenario, one.draw.seed, one.how, one.draw.arm_seed) if on_disk else None
         if known is None:
             left.append(one)
         else:
             yield one, known
-    with contextlib.closing(finished(find, left, workers)) as done:
+    with contextlib.closing(run_units(find, left, workers)) as done:
         for one, future in done:
             try:
                 optimum = future.result()
@@ -87,7 +87,7 @@ def find_all(
                 raise WorkerError(f"{one.scenario.name}, seed {one.draw.seed}: {e} Results so far are kept.") from None
             _check(one, optimum)
             if one.cached and not one.policies:
-                keep(optimum, one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
+                write_cached(optimum, one.scenario, one.draw.seed, one.how, one.draw.arm_seed)
             tick(one, 1.0)
             yield one, optimum
 
@@ -101,17 +101,17 @@ def check_policies(wanted: Sequence[Wanted]) -> None:
     """
     for one in {one.scenario.name: one for one in wanted}.values():
         for spec in one.policies:
-            _made(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), spec)
+            _make_policy(strip_plant(one.scenario, one.draw.seed, one.draw.arm_seed), spec)
 
 
-def _made(scenario: Scenario, spec: str) -> SolverPolicy:
+def _make_policy(scenario: Scenario, spec: str) -> SolverPolicy:
     name, parameters = parse_policy(spec)
     return registry.make(name, scenario, **parameters)
 
 
 def _check(one: Wanted, optimum: Optimum) -> None:
     """Checks that this machine computes the same cost of a path."""
-    episode = EpisodeProblem.of(stripped(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
+    episode = EpisodeProblem.of(strip_plant(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
     _, cost = episode.play(optimum.qdot)
     if not math.isclose(cost, optimum.cost, rel_tol=TOLERANCE, abs_tol=MEANINGLESS):
         raise WorkerError(

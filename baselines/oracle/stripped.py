@@ -16,7 +16,7 @@ from ikgym.scenarios import Scenario
 NOTE = "without drives and sensors"
 
 
-def stripped(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scenario:
+def strip_plant(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Scenario:
     """The scenario in which the arm of one episode moves, ideally driven and measured.
 
     Of the plant nothing is left but the payload, which the arm takes up on the way; a scenario whose plant is ideal

@@ -33,7 +33,7 @@ class Panel(NamedTuple):
     title: str = ""
 
 
-def compared(
+def compare_coordinates(
     labels: Sequence[str],
     x: FloatArray,
     actual: FloatArray,

@@ -60,7 +60,7 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
-def scaled(values: Figures, unit: str) -> dict[str, float | Sequence[float]]:
+def in_unit(values: Figures, unit: str) -> dict[str, float | Sequence[float]]:
     """Figures in a unit such as ``"mm"`` or ``"%"``, from SI units or shares by name without the unit."""
     scale = _SCALES.get(unit, 1.0)
     return {

@@ -80,13 +80,13 @@ def in_time(scenario: Scenario, timing: Callable[[Trajectory], Trajectory]) -> d
 
 
 def with_slow_joints_spared(scenario: Scenario) -> tuple[str, ...]:
-    """`qp` with weights that spare slow joints, as texts for :func:`played`; none where no joint is slow."""
+    """`qp` with weights that spare slow joints, as texts for :func:`play_from`; none where no joint is slow."""
     weights = [np.ravel(velocity_weights(scenario.model, scenario.largest_qdot, power, SLOW)) for power in HEAVIER]
     rows = [row for row in weights if np.ptp(row) > 0.0]
     return tuple(f"{PREFERRED}:joint_weights=[{','.join(f'{one:.4g}' for one in row)}]" for row in rows)
 
 
-def played(scenario: Scenario, starts: FloatArray, solver: str = PREFERRED) -> Motion:
+def play_from(scenario: Scenario, starts: FloatArray, solver: str = PREFERRED) -> Motion:
     """A solver on a result of :func:`ideal` from starts (N, n) in [rad] or [m]; with collisions, these must be clear.
 
     A repulsion of `qp` that long control periods do not allow is as large as it may be.

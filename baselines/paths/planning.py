@@ -66,7 +66,7 @@ def plan(found: Survey, *, fastest: bool = False) -> Plan | None:
     q = routes.route(found.best.start if len(found.branches) == 1 else None)
     if len(q) < len(times):
         return Plan(float(times[max(len(q) - 1, 0)]), None)
-    for motion in _smoothed(routes, _shortened(routes, q), at, along / along[-1]):
+    for motion in _smooth(routes, _shorten(routes, q), at, along / along[-1]):
         planned = found.scenario.replace(trajectory=motion, start=motion.q[0], initial_pose=None)
         surveyed = survey(planned, reserve=found.reserve, solver=PLAYER, begin=motion.q[:1])
         if candidate := best_candidate(surveyed, FOLLOWED, fastest):
@@ -84,7 +84,7 @@ def _progress(scenario: Scenario, times: FloatArray) -> FloatArray:
     return np.append(0.0, np.cumsum(steps))
 
 
-def _shortened(routes: Routes, q: FloatArray) -> FloatArray:
+def _shorten(routes: Routes, q: FloatArray) -> FloatArray:
     """Postures at the knots that lie closer to the middle of their neighbours, where these are clear. Shape (k, n)."""
     rows, clearances = np.arange(len(q)), _clearances(routes.scenario, routes.times)
     for stride in STRIDES:
@@ -106,7 +106,7 @@ def _clearances(scenario: Scenario, times: FloatArray) -> Callable[[FloatArray],
     return lambda q: closest(scenario.arm, q, solids, checked).distances
 
 
-def _smoothed(routes: Routes, q: FloatArray, times: FloatArray, along: FloatArray) -> Iterator[JointPath]:
+def _smooth(routes: Routes, q: FloatArray, times: FloatArray, along: FloatArray) -> Iterator[JointPath]:
     """Joint motions along the path, near postures at knots (k, n), which meet all poses and are clear."""
     from scipy.interpolate import make_lsq_spline
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.controller.guards import Guards
 from baselines.paths.motion import OTHERS, PREFERRED, Motion, with_slow_joints_spared
-from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, followed, survey
+from baselines.paths.survey import FOLLOWED, REACHED, Branch, Survey, branch_of, last_if_followed, survey
 from baselines.paths.timing import Timing
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -95,7 +95,7 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float
         ModuleNotFoundError: toppra is not installed.
     """
     found = scenario if isinstance(scenario, Survey) else survey(scenario, reserve=reserve)
-    out = retimed(found, fastest=fastest)
+    out = find_retimed(found, fastest=fastest)
     if out is None:
         raise InvalidInputError(
             f"Scenario {found.scenario.name!r}: expected a path that can be driven; {refusal(found)}"
@@ -103,7 +103,7 @@ def retime(scenario: Scenario | Survey, *, fastest: bool = False, reserve: float
     return out
 
 
-def retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
+def find_retimed(found: Survey, *, fastest: bool = False) -> Retimed | None:
     """The result of :func:`retime`; None where no start leads along the whole path, or no solver follows from any."""
     best = best_candidate(found, FOLLOWED, fastest)
     if fastest or best is None or best.timing.duration > found.duration:
@@ -140,7 +140,7 @@ def _by_another(found: Survey, rough: Candidate | None, fastest: bool) -> Candid
         timings.insert(0, (rough.branch, rough.timing))
     for slower, solver in itertools.product(OTHER_SLOWER, OTHERS):
         for branch, timing in timings:
-            if timing and (candidate := _followed(found, branch, timing.slower(slower), FOLLOWED, solver)):
+            if timing and (candidate := _with_motion(found, branch, timing.slower(slower), FOLLOWED, solver)):
                 return candidate
     return None
 
@@ -171,24 +171,24 @@ def _faster(found: Survey, branch: Branch, best: Candidate | None, errors: Error
         return best
     most = SLOWEST if best is None else min(SLOWEST, (1.0 - PRECISION) * best.timing.duration / timing.duration)
     low, high, step = 1.0, 1.0, PRECISION
-    while high <= most and (tried := _followed(found, branch, timing.slower(high), errors)) is None:
+    while high <= most and (tried := _with_motion(found, branch, timing.slower(high), errors)) is None:
         low, high, step = high, high + step, 3.0 * step
     if high > most:
         return best
     while high - low > PRECISION:
         middle = 0.5 * (low + high)
-        slower = _followed(found, branch, timing.slower(middle), errors)
+        slower = _with_motion(found, branch, timing.slower(middle), errors)
         low, high, tried = (middle, high, tried) if slower is None else (low, middle, slower)
     return tried
 
 
-def _followed(
+def _with_motion(
     found: Survey, branch: Branch, timing: Timing, errors: Errors, solver: str | None = None
 ) -> Candidate | None:
     """The timing with its motion, if the solver follows."""
     solver = found.solver if solver is None else solver
     trajectory = timing.of(found.scenario.trajectory)
-    motion = followed(found.play(solver, branch.start, trajectory=trajectory), errors)
+    motion = last_if_followed(found.play(solver, branch.start, trajectory=trajectory), errors)
     return None if motion is None else Candidate(branch, timing, motion, solver)
 
 

@@ -141,7 +141,7 @@ class Routes:
         near = met & (np.abs(moves).max(axis=1) <= USED)
         found = Layer(q, last.cost[rows] + (moves * moves).sum(axis=1), rows).of(near)
         for part in PARTS:
-            found = found.of(self._clear(knot - 1.0 + part, self._between(last, found, part)))
+            found = found.of(self._clear(knot - 1.0 + part, self._interpolate(last, found, part)))
         return found.of(self._cheapest(found.q, found.cost, rng))
 
     def _back(self, q: FloatArray, moves: FloatArray) -> FloatArray:
@@ -195,11 +195,11 @@ class Routes:
         """The poses at the knots, as :meth:`Trajectory.frames` has them. Shape (k, 12) or (k, 3)."""
         return self.scenario.trajectory.frames(self.times, self.scenario.model)
 
-    def _between(self, last: Layer, found: Layer, part: float) -> FloatArray:
+    def _interpolate(self, last: Layer, found: Layer, part: float) -> FloatArray:
         begin = last.q[found.before]
         return begin + part * (found.q - begin)
 
-    def _wrapped(self, q: FloatArray) -> FloatArray:
+    def _wrap(self, q: FloatArray) -> FloatArray:
         """The same postures, joints without limits within a turn."""
         endless = np.isinf(self.scenario.arm.upper - self.scenario.arm.lower)
         return np.where(endless, np.remainder(q, 2.0 * np.pi), q)
@@ -207,7 +207,7 @@ class Routes:
     def _cheapest(self, q: FloatArray, cost: FloatArray, rng: np.random.Generator) -> npt.NDArray[np.int64]:
         """The rows of the least costs in each cell, some of them where they are too many. Shapes (N, n), (N,)."""
         order = np.argsort(cost, kind="stable")
-        cells = np.floor(self._wrapped(q[order]) / (self.cell * self.largest)).astype(np.int64)
+        cells = np.floor(self._wrap(q[order]) / (self.cell * self.largest)).astype(np.int64)
         chosen: npt.NDArray[np.int64] = order[np.unique(cells, axis=0, return_index=True)[1]]
         return chosen if len(chosen) <= self.postures else rng.choice(chosen, self.postures, replace=False)
 

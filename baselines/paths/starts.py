@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.paths.motion import ideal, in_time, played
+from baselines.paths.motion import ideal, in_time, play_from
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.obstacles.solids import closest
@@ -37,7 +37,7 @@ def starts(scenario: Scenario) -> FloatArray:
         usual, found = _clear(scenario, usual, found)
     if not len(found):
         return usual
-    settled = played(_held(scenario), _middlemost(scenario.arm, found))
+    settled = play_from(_hold_first_pose(scenario), _middlemost(scenario.arm, found))
     still = settled.q[-1][settled.position_error[-1] < 1e-6]
     return _distinct(scenario.arm, _distinct(scenario.arm, usual, still, BRANCHES), found, BRANCHES)
 
@@ -82,7 +82,7 @@ def _rotations(frame: FloatArray, errors: int, rng: np.random.Generator) -> Floa
     return turned
 
 
-def _held(scenario: Scenario) -> Scenario:
+def _hold_first_pose(scenario: Scenario) -> Scenario:
     """The first pose, held."""
     ends = np.array([0.0, SETTLING])
     held = in_time(scenario, lambda one: RetimedTrajectory(one, ends, np.zeros(2), np.zeros(2)))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.controller.guards import Guards
-from baselines.paths.motion import PREFERRED, Motion, ideal, in_time, path_duration, played
+from baselines.paths.motion import PREFERRED, Motion, ideal, in_time, path_duration, play_from
 from baselines.paths.starts import starts
 from baselines.paths.timing import Timing, grid, shortest
 from ikgym.exceptions import InvalidInputError
@@ -152,7 +152,7 @@ class Survey:
             return None
         if solver not in self._motions:
             self._motions[solver] = self.play(solver, start=self.best.start)
-        return followed(self._motions[solver], errors)
+        return last_if_followed(self._motions[solver], errors)
 
     def timing_of(self, branch: Branch, fastest: bool) -> Timing | None:
         """The timing of a branch, as fast as asked or as the limits allow; eased in where there is a reserve."""
@@ -165,14 +165,14 @@ class Survey:
         A redundant arm may move otherwise within the whole limits.
         """
         scenarios = [self.limited] if self.reserve == 0.0 else [self.limited, self.scenario]
-        return [played(ideal(scenario, start=start, **changes), start[None], solver) for scenario in scenarios]
+        return [play_from(ideal(scenario, start=start, **changes), start[None], solver) for scenario in scenarios]
 
     @functools.cached_property
     def _motions(self) -> dict[str, list[Motion]]:
         return {}
 
 
-def followed(motions: Sequence[Motion], errors: tuple[float, float]) -> Motion | None:
+def last_if_followed(motions: Sequence[Motion], errors: tuple[float, float]) -> Motion | None:
     """The last of motions that all follow within errors in [m] and [rad]; None if one does not."""
     return motions[-1] if all(follows(motion, errors) for motion in motions) else None
 
@@ -251,7 +251,7 @@ def _branches(scenario: Scenario, starts: FloatArray, slowing: float, solver: st
     """Branches from starts of shape (N, n), played in a multiple of the requested time."""
     timing = Timing.uniform(path_duration(scenario), slowing)
     dt = timing.duration / min(max(timing.duration / scenario.dt, FEWEST_STEPS), MOST_STEPS)
-    motion = played(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts, solver)
+    motion = play_from(ideal(scenario, **in_time(scenario, timing.of), start=starts[0], dt=dt), starts, solver)
     return [branch_of(scenario, motion.of(row), timing) for row in range(len(starts))]
 
 

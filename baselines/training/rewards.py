@@ -16,14 +16,14 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 import ikgym.sb3
-from baselines.files import csv_text, reading, reason, resumed, write, write_json
+from baselines.files import csv_text, read_resumable, reading, reason, write, write_json
 from baselines.training.exporting import export
 from baselines.training.options import Rewards
 from baselines.training.zoo import ALGORITHMS, arguments, read_settings
 from ikgym import rl
 from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.sb3 import LearningVecEnv
-from ikgym.validation import number, shortened, whole_number
+from ikgym.validation import number, shorten, whole_number
 
 
 def train(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def read_finished(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str,
         ResultsError: Another run has.
     """
     file = folder / "run.json"
-    there = resumed(file, identity(config, seed))
+    there = read_resumable(file, identity(config, seed))
     if there is not None:
         with reading(file):
             for name in ("validation_score", "steps"):
@@ -145,4 +145,4 @@ def _checked_by(algorithm: str, settings: Mapping[str, Any]) -> Iterator[None]:
     except (IkgymError, MemoryError, OSError):
         raise
     except Exception as e:
-        raise InvalidInputError(f"settings: {algorithm} refuses {shortened(settings, 300)}: {reason(e)}.") from e
+        raise InvalidInputError(f"settings: {algorithm} refuses {shorten(settings, 300)}: {reason(e)}.") from e

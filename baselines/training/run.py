@@ -34,7 +34,7 @@ from baselines.agents.files import AgentFile, save_agent
 from baselines.agents.policy import Agent
 from baselines.episodes import Policy, add_up, rollouts
 from baselines.evaluation.metrics import describe, lost
-from baselines.files import read_bytes, reading, resumed, write, write_json
+from baselines.files import read_bytes, read_resumable, reading, write, write_json
 from baselines.fingerprints import fingerprint
 from baselines.oracle import best_known
 from baselines.policy import Problem
@@ -92,7 +92,7 @@ def read_finished(config: APG, seed: int, folder: pathlib.Path) -> dict[str, Any
     Raises:
         ResultsError: There is another run.
     """
-    there = resumed(folder / RUN, identity(config, seed))
+    there = read_resumable(folder / RUN, identity(config, seed))
     return there if there is not None and there.get("status") == "finished" else None
 
 
@@ -122,7 +122,7 @@ class _Run:
         """Prepares the folder, and restores the state of the run in it, if there is one."""
         policy_of(self._trainer.agent(), self._scenario)  # what is refused is refused before files are replaced
         manifest, checkpoint = self._folder / RUN, self._folder / CHECKPOINT
-        there = resumed(manifest, self._identity)
+        there = read_resumable(manifest, self._identity)
         if there is None:
             clear(self._folder)
         else:

@@ -25,7 +25,7 @@ from baselines.training.exporting import ACTIVATIONS
 from baselines.training.options import Rewards
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_file
-from ikgym.validation import FloatArray, flag, known_name, known_names, number, shortened, whole_number
+from ikgym.validation import FloatArray, flag, known_name, known_names, number, shorten, whole_number
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "recurrent_ppo": RecurrentPPO}
 #: The published settings: a file an algorithm, with an entry an environment.
@@ -60,10 +60,10 @@ def read_settings(config: Rewards) -> dict[str, Any]:
     known_name("environment in the settings", config.env, content)
     entry = content[config.env]
     if not isinstance(entry, dict) or "n_timesteps" not in entry:
-        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {shortened(entry)}.")
+        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {shorten(entry)}.")
     if not _is_json(entry):  # run.json states them
         raise InvalidInputError(
-            f"settings: expected texts, finite numbers, lists and tables by text, got {shortened(entry)}."
+            f"settings: expected texts, finite numbers, lists and tables by text, got {shorten(entry)}."
         )
     steps = number("n_timesteps", entry["n_timesteps"], at_least=1.0)
     return {**entry, "n_timesteps": int(steps)}
@@ -141,7 +141,7 @@ def _check_layers(value: Any) -> None:
     known_names("network in net_arch", tables, ("pi", "vf", "qf"))
     for widths in tables.values():
         if not isinstance(widths, list):
-            raise InvalidInputError(f"net_arch: expected lists of the widths of layers, got {shortened(value)}.")
+            raise InvalidInputError(f"net_arch: expected lists of the widths of layers, got {shorten(value)}.")
         for width in widths:
             whole_number("net_arch", width, at_least=1)
 
@@ -173,7 +173,7 @@ def _argument(name: str, value: Any, hint: Any) -> Any:
         if text and value.startswith("dict("):
             value = _parse(name, value)
         if not isinstance(value, dict):
-            raise InvalidInputError(f"{name}: expected a table, got {shortened(value)}.")
+            raise InvalidInputError(f"{name}: expected a table, got {shorten(value)}.")
     return value
 
 
@@ -196,7 +196,7 @@ def _parse(name: str, text: str) -> Any:
         return _literal(ast.parse(text, mode="eval").body)
     except (MemoryError, RecursionError, SyntaxError, ValueError) as e:  # of text that nests too deeply
         raise InvalidInputError(
-            f"settings: expected {name} in the format of rl-zoo3, got {shortened(text)}: {reason(e)}."
+            f"settings: expected {name} in the format of rl-zoo3, got {shorten(text)}: {reason(e)}."
         ) from e
 
 

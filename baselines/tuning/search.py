@@ -22,7 +22,7 @@ from baselines.files import canonical, check_flags, check_same, read_bytes, read
 from baselines.fingerprints import fingerprint
 from baselines.registry import parse_policy
 from baselines.tuning.ranges import RANGES, Range, nest, ranges_of, read_ranges, round_digits, suggest
-from baselines.workers import Workers, finished
+from baselines.workers import Workers, run_units
 from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -170,7 +170,7 @@ def run(
             _work(unit)
     else:
         # Not retried: a killed process may leave the journal locked.
-        with contextlib.closing(finished(_work, units, crew, tries=1)) as done:
+        with contextlib.closing(run_units(_work, units, crew, tries=1)) as done:
             for _, future in done:
                 future.result()
     return [_best(_study(file, one), one) for one in wanted]

@@ -18,7 +18,7 @@ from baselines.viewer.replay import size
 from baselines.viewer.session import Mode, PolicyView, Session
 from ikgym.arms import Arm
 from ikgym.kernels.rotations import quaternion
-from ikgym.obstacles.solids import bounded, on_links, surface
+from ikgym.obstacles.solids import cut_half_spaces, on_links, surface
 from ikgym.rendering.scene import GREEN, PALE_GREEN, Scene, stride, thin
 from ikgym.validation import FloatArray
 
@@ -109,7 +109,7 @@ class DrawnBodies:
         ]
         self._obstacles = [
             self._solid(f"{root}/obstacle_{number}", solid, OBSTACLE, OF_OBSTACLES)
-            for number, solid in enumerate(bounded(start.obstacles, self._edge))
+            for number, solid in enumerate(cut_half_spaces(start.obstacles, self._edge))
         ]
         self._line = self._scene.add_line_segments(f"{root}/closest", np.zeros((1, 2, 3)), colors=LINE, line_width=2.0)
         self._distance = self._scene.add_label(f"{root}/distance", "")
@@ -123,7 +123,7 @@ class DrawnBodies:
 
     def show(self, scene: Scene) -> None:
         """Moves the obstacles and the line between the closest pair; the bodies move with the arm."""
-        boxes, distance = bounded(scene.obstacles, self._edge), float(scene.closest.distances[0])
+        boxes, distance = cut_half_spaces(scene.obstacles, self._edge), float(scene.closest.distances[0])
         for number in np.flatnonzero((boxes != self._boxes).any(axis=1)).tolist():
             _move(self._obstacles[number], boxes[number])
         self._boxes = boxes

@@ -32,7 +32,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Leads links to pages at the root, and to notebooks, to where the site has them, and shows the replay."""
-    markdown = replay.placed(markdown, there=replay.PAGE in files.src_uris)
+    markdown = replay.place_report(markdown, there=replay.PAGE in files.src_uris)
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]  # it would be empty
     up = "../" * page.file.src_uri.count("/")

@@ -29,14 +29,14 @@ def public_names(module: ModuleType) -> list[str]:
     A class is described once.
     """
     names = getattr(module, "__all__", None) or [n for n, x in vars(module).items() if _of(x) == module.__name__]
-    return [name for name in names if not name.startswith("_") and _described(getattr(module, name))]
+    return [name for name in names if not name.startswith("_") and _describe(getattr(module, name))]
 
 
 def _of(thing: Any) -> str | None:
-    return getattr(thing, "__module__", None) if _described(thing) else None
+    return getattr(thing, "__module__", None) if _describe(thing) else None
 
 
-def _described(thing: Any) -> bool:
+def _describe(thing: Any) -> bool:
     """Classes, functions, and kernels, which numba has wrapped."""
     return inspect.isclass(thing) or inspect.isfunction(thing) or hasattr(thing, "py_func")
 

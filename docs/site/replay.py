@@ -39,6 +39,6 @@ def file(config: MkDocsConfig) -> File | None:
     return File.generated(config, PAGE, abs_src_path=str(report))
 
 
-def placed(markdown: str, *, there: bool) -> str:
+def place_report(markdown: str, *, there: bool) -> str:
     """A page that shows the report where it is to be, or says that it is not there."""
     return _PLACE.sub(lambda found: f"{found[0]}\n\n{_SHOWN if there else _ABSENT}", markdown)

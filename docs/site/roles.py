@@ -48,7 +48,7 @@ class Roles(griffe.Extension):
             if importlib.util.find_spec(target.partition(".")[0]) is None:
                 _log.warning(f"{scope}: its docstring refers to {target!r}, which does not exist")
             return f"`{target}`"
-        nearest = max(there, key=lambda path: _shared(path, scope))
+        nearest = max(there, key=lambda path: _count_shared(path, scope))
         return f'<autoref identifier="{nearest}" optional>`{target}`</autoref>'
 
     def _meant(self, target: str) -> list[str]:
@@ -58,7 +58,7 @@ class Roles(griffe.Extension):
         return exact or (self._paths[name] if owner and self._meant(owner) else [])
 
 
-def _shared(one: str, other: str) -> int:
+def _count_shared(one: str, other: str) -> int:
     """How many names two paths share from the beginning on."""
     pairs = zip(one.split("."), other.split("."), strict=False)
     return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -29,7 +29,7 @@ from ikgym.validation import (
     float_array,
     frozen_array,
     read_only,
-    shortened,
+    shorten,
 )
 
 #: Fields that say nothing of the geometry.
@@ -93,7 +93,7 @@ class Arm(Frozen):
     urdf: UrdfReference | None = dataclasses.field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        with about(f"Arm {shortened(self.name)}"):
+        with about(f"Arm {shorten(self.name)}"):
             super().__post_init__()
             self._check()
 
@@ -335,7 +335,7 @@ def _truth_values(name: str, prismatic: Any, n: int) -> tuple[bool, ...]:
     """Which joints are prismatic, one entry a joint."""
     values = (tuple(prismatic) or (False,) * n) if isinstance(prismatic, Iterable) else ()
     if len(values) != n or not all(isinstance(value, (bool, np.bool_)) for value in values):
-        raise InvalidInputError(f"{name}: expected {n} truth values, one a joint, got {shortened(prismatic)}.")
+        raise InvalidInputError(f"{name}: expected {n} truth values, one a joint, got {shorten(prismatic)}.")
     return tuple(bool(value) for value in values)
 
 
@@ -361,7 +361,7 @@ def joint_limits(
         if raw.dtype.kind not in "fiu" or raw.shape != (n,) or np.isnan(raw).any():
             raise ValueError
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: expected {n} numbers, got {shortened(value)}.") from None
+        raise InvalidInputError(f"{name}: expected {n} numbers, got {shorten(value)}.") from None
     if positive and (raw <= 0.0).any():
         raise InvalidInputError(f"{name}: expected numbers above 0, got {raw.tolist()}.")
     return read_only(raw.astype(np.float64))

@@ -23,7 +23,7 @@ from ikgym.validation import (
     frozen_array,
     known_names,
     read_only,
-    shortened,
+    shorten,
     whole_number,
 )
 
@@ -204,7 +204,7 @@ class Bodies(Frozen):
             UnknownNameError: An obstacle ignores a body that there is not.
         """
         if not isinstance(obstacles, (tuple, list)) or not all(isinstance(one, Neighbour) for one in obstacles):
-            raise InvalidInputError(f"obstacles: expected a list of obstacles, got {shortened(obstacles)}.")
+            raise InvalidInputError(f"obstacles: expected a list of obstacles, got {shorten(obstacles)}.")
         rows = [np.reshape(one.numbers(), (-1, OBSTACLE)) for one in obstacles]
         boxes, checked = np.concatenate([np.empty((0, OBSTACLE)), *rows]), []
         for one in obstacles:
@@ -223,7 +223,7 @@ def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     pairs = []
     for pair in _to_tuple("ignored pairs", given):
         if not isinstance(pair, (tuple, list)) or len(pair) != 2 or not all(isinstance(one, str) for one in pair):
-            raise InvalidInputError(f"ignored pairs of bodies: expected two names each, got {shortened(pair)}.")
+            raise InvalidInputError(f"ignored pairs of bodies: expected two names each, got {shorten(pair)}.")
         known_names("body", pair, names)
         pairs.append((pair[0], pair[1]))
     return tuple(pairs)
@@ -231,5 +231,5 @@ def _pairs(given: Any, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
 
 def _to_tuple(name: str, given: Any) -> tuple[Any, ...]:
     if not isinstance(given, (tuple, list, np.ndarray)):
-        raise InvalidInputError(f"{name} of bodies: expected a list, got {shortened(given)}.")
+        raise InvalidInputError(f"{name} of bodies: expected a list, got {shorten(given)}.")
     return tuple(given)

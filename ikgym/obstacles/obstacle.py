@@ -22,7 +22,7 @@ from ikgym.validation import (
     Sizes,
     Vector,
     about,
-    shortened,
+    shorten,
 )
 
 
@@ -48,7 +48,7 @@ class Obstacle(Frozen, abc.ABC):
     random: typing.ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        with about(f"Obstacle {shortened(self.name)}"):
+        with about(f"Obstacle {shorten(self.name)}"):
             super().__post_init__()
             self._check()
         self._settle(ignored=tuple(self.ignored))
@@ -63,9 +63,9 @@ class Obstacle(Frozen, abc.ABC):
         if not self.name:
             raise InvalidInputError("name: expected a text, got an empty one.")
         if self.motion is not None and self.motion.random:
-            raise InvalidInputError(f"motion: expected a trajectory that is not random, got {shortened(self.motion)}.")
+            raise InvalidInputError(f"motion: expected a trajectory that is not random, got {shorten(self.motion)}.")
         if not isinstance(self.ignored, (tuple, list)) or not all(isinstance(one, str) for one in self.ignored):
-            raise InvalidInputError(f"ignored: expected a list of names of bodies, got {shortened(self.ignored)}.")
+            raise InvalidInputError(f"ignored: expected a list of names of bodies, got {shorten(self.ignored)}.")
 
     @abc.abstractmethod
     def numbers(self) -> FloatArray:

@@ -125,7 +125,7 @@ def in_space(solid: FloatArray, points: FloatArray) -> FloatArray:
     return moved
 
 
-def bounded(solids: FloatArray, edge: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+def cut_half_spaces(solids: FloatArray, edge: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """The same solids, of shape (..., 16), half-spaces as square plates.
 
     The middle of a plate is the point of the face that is closest to `centre`; `edge` is half of its edge, in [m].

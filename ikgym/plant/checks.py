@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.validation import LARGEST, frozen_array, number, shortened, whole_number
+from ikgym.validation import LARGEST, frozen_array, number, shorten, whole_number
 
 #: One number for all joints, or one a joint.
 PerJoint = float | tuple[float, ...]
@@ -41,7 +41,7 @@ def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
     array = frozen_array(name, value, at_most=LARGEST)
     if array.ndim > 1 or not array.size or (not signed and (array < 0.0).any()):
         least = "" if signed else " of at least 0"
-        raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {shortened(array.tolist())}.")
+        raise InvalidInputError(f"{name}: expected a number{least} or one a joint, got {shorten(array.tolist())}.")
     return float(array) if array.ndim == 0 else tuple(array.tolist())
 
 
@@ -58,7 +58,7 @@ def frequency(name: str, value: Any) -> Drawn | PerJoint:
             math.inf if isinstance(one, float) and one == math.inf else number(name, one, above=0.0, at_most=LARGEST)
             for one in value
         )
-    return _drawn(name, value, "numbers above 0", functools.partial(number, above=0.0, at_most=LARGEST))
+    return _number_or_range(name, value, "numbers above 0", functools.partial(number, above=0.0, at_most=LARGEST))
 
 
 def numbers(name: str, value: Any) -> Drawn:
@@ -67,7 +67,9 @@ def numbers(name: str, value: Any) -> Drawn:
     Raises:
         InvalidInputError: It is neither, or the range is the wrong way round.
     """
-    return _drawn(name, value, "numbers of at least 0", functools.partial(number, at_least=0.0, at_most=LARGEST))
+    return _number_or_range(
+        name, value, "numbers of at least 0", functools.partial(number, at_least=0.0, at_most=LARGEST)
+    )
 
 
 def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
@@ -76,7 +78,7 @@ def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
     Raises:
         InvalidInputError: It is neither, or the range is the wrong way round.
     """
-    drawn: Any = _drawn(name, value, "whole numbers", functools.partial(whole_number, at_least=at_least))
+    drawn: Any = _number_or_range(name, value, "whole numbers", functools.partial(whole_number, at_least=at_least))
     return drawn  # type: ignore[no-any-return]  # whole numbers come as such
 
 
@@ -102,7 +104,7 @@ def resonances(name: str, value: Any) -> PerJoint:
     several = isinstance(given, (tuple, list))
     found: Any = list(given) if several else [given]
     if not found or any(isinstance(one, (tuple, list, np.ndarray)) for one in found):
-        raise InvalidInputError(f"{name}: expected a number above 0 or one a joint, got {shortened(given)}.")
+        raise InvalidInputError(f"{name}: expected a number above 0 or one a joint, got {shorten(given)}.")
     found = tuple(frequency(name, one) for one in found)
     return found if several else found[0]  # type: ignore[no-any-return]  # numbers alone
 
@@ -115,7 +117,7 @@ def damping(name: str, value: Any) -> PerJoint:
     """
     found = joint_numbers(name, value)
     if np.min(found) <= 0.0 or np.max(found) >= 1.0:
-        raise InvalidInputError(f"{name}: expected numbers above 0 and below 1, got {shortened(value)}.")
+        raise InvalidInputError(f"{name}: expected numbers above 0 and below 1, got {shorten(value)}.")
     return found
 
 
@@ -150,7 +152,7 @@ def shares(name: str, value: Any) -> tuple[float, float]:
     Raises:
         InvalidInputError: They are no such shares.
     """
-    drawn = _drawn(name, value, "shares", share)
+    drawn = _number_or_range(name, value, "shares", share)
     if not isinstance(drawn, tuple) or drawn[0] == drawn[1]:
         raise InvalidInputError(f"{name}: expected two shares (near, far) with near < far, got {value!r}.")
     return drawn
@@ -165,7 +167,7 @@ def share(name: str, value: Any) -> float:
     return number(name, value, at_least=0.0, at_most=1.0)
 
 
-def _drawn(name: str, value: Any, meant: str, check: Callable[[str, Any], float]) -> Drawn:
+def _number_or_range(name: str, value: Any, meant: str, check: Callable[[str, Any], float]) -> Drawn:
     """A number, or a range (low, high), each end of which a check takes."""
     if not isinstance(value, (tuple, list, np.ndarray)):
         return check(name, value)

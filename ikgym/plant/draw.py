@@ -15,7 +15,7 @@ from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread
 from ikgym.plant.checks import PerJoint, is_range
 from ikgym.plant.contact import turn_bodies
 from ikgym.plant.plant import WHOLE, Plant
-from ikgym.plant.severity import scaled
+from ikgym.plant.severity import scale
 from ikgym.validation import FloatArray, whole_number
 
 Keys = npt.NDArray[np.uint64]
@@ -123,14 +123,14 @@ class Draws:
         self.arms(keys, np.zeros(1, dtype=np.int64), numbers, out)
         ends = np.empty((2, 1, 2, len(self._arm.bodies), 3))
         self.bodies(keys, np.zeros(1, dtype=np.int64), numbers, out.axes, (ends[0], ends[1]))
-        before, after = (self._made(ends[:, 0, loaded], *(part[0, loaded] for part in out)) for loaded in range(2))
+        before, after = (self._make_arm(ends[:, 0, loaded], *(part[0, loaded] for part in out)) for loaded in range(2))
         loaded = after if np.any(plant.payload) else before
         bandwidth = _known(plant.bandwidth, float(numbers.bandwidth[0]))
         delay, load = _known(plant.command_delay, int(numbers.command_delay[0])), float(numbers.load[0])
-        payload = scaled(plant.payload, load)
+        payload = scale(plant.payload, load)
         return DrawnPlant(before, loaded, plant.payload_step, bandwidth, delay, payload, context[0])
 
-    def _made(self, ends: FloatArray, *chain: FloatArray) -> Arm:
+    def _make_arm(self, ends: FloatArray, *chain: FloatArray) -> Arm:
         bodies = self._arm.bodies.replace(starts=ends[0], ends=ends[1])
         return self._arm.replace(**dict(zip(Arms._fields, chain, strict=True)), bodies=bodies)
 

@@ -12,7 +12,7 @@ from ikgym.files import read_user_toml
 from ikgym.frozen import Frozen
 from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.plant.plant import Plant
-from ikgym.validation import Positive, known_names, shortened
+from ikgym.validation import Positive, known_names, shorten
 
 #: Control periods may differ by this share: that of a log is measured.
 ALIKE = 0.01
@@ -44,7 +44,7 @@ class IdentifiedPlant(Frozen):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.joints, (tuple, list)) or not all(isinstance(one, str) for one in self.joints):
-            raise InvalidInputError(f"joints: expected names of joints, got {shortened(self.joints)}.")
+            raise InvalidInputError(f"joints: expected names of joints, got {shorten(self.joints)}.")
         self._settle(joints=tuple(self.joints), delay=joint_numbers("delay", self.delay))
         self._settle(time_constant=joint_numbers("time_constant", self.time_constant))
 
@@ -93,5 +93,5 @@ class IdentifiedPlant(Frozen):
 def _table(table: dict[str, Any], key: str) -> dict[str, Any]:
     found = table.get(key, {})
     if not isinstance(found, dict):
-        raise InvalidInputError(f"{key}: expected a table, got {shortened(found)}.")
+        raise InvalidInputError(f"{key}: expected a table, got {shorten(found)}.")
     return found

@@ -17,7 +17,7 @@ from ikgym.kernels.random_numbers import CUT
 from ikgym.plant import checks, severity
 from ikgym.plant.arm_kernels import Numbers
 from ikgym.plant.checks import Drawn, PerJoint
-from ikgym.validation import LARGEST, FloatArray, number, per_joint, shortened, whole_number
+from ikgym.validation import LARGEST, FloatArray, number, per_joint, shorten, whole_number
 
 #: Fields with one number for all joints, or one a joint; and those of them that may be negative.
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise", "gain")
@@ -145,7 +145,7 @@ class Plant(Frozen):
             "arms": _arms(self.arms),
         }
         if not np.min(settled["gain"]) > 0.0:
-            raise InvalidInputError(f"gain: expected numbers above 0, got {shortened(self.gain)}.")
+            raise InvalidInputError(f"gain: expected numbers above 0, got {shorten(self.gain)}.")
         for name, value in settled.items():
             object.__setattr__(self, name, value)
 
@@ -296,5 +296,5 @@ class Plant(Frozen):
 
 def _arms(given: Any) -> tuple[Arm, ...]:
     if not isinstance(given, (tuple, list)) or not all(isinstance(one, Arm) for one in given):
-        raise InvalidInputError(f"arms: expected a sequence of arms, got {shortened(given)}.")
+        raise InvalidInputError(f"arms: expected a sequence of arms, got {shorten(given)}.")
     return tuple(given)

@@ -121,7 +121,7 @@ class PlantRows:
             shown_step=np.zeros(rows, dtype=np.int64),
         )
         keys = np.zeros(rows, dtype=np.uint64)
-        self._set(np.arange(rows), *self._draws.numbers(keys))
+        self._set_numbers(np.arange(rows), *self._draws.numbers(keys))
         self._draw(np.arange(rows), keys)
 
     @staticmethod
@@ -181,9 +181,9 @@ class PlantRows:
         if self.contacts is not None:
             self._draws.bodies(keys, rows, numbers, self.arms.axes, (self.contacts.starts, self.contacts.ends))
         if context.size:
-            self._set(rows, numbers, context)
+            self._set_numbers(rows, numbers, context)
 
-    def _set(self, rows: Integers, numbers: Numbers, context: FloatArray) -> None:
+    def _set_numbers(self, rows: Integers, numbers: Numbers, context: FloatArray) -> None:
         """Sets the numbers that rows have drawn from ranges."""
         plant = self._plant
         self.context[rows] = context

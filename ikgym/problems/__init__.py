@@ -101,14 +101,14 @@ def _read(name: str) -> Problem:
     stored = _archive()
     order, owners, methods = (stored[key].tolist() for key in ("names", "trajectory_names", "methods"))
     number, lengths, shapes = order.index(name), stored["lengths"], stored["start_shapes"]
-    poses = _restored(_part(stored["poses"], lengths, number), FINE, WAYPOINTS_ORDER)
+    poses = _restore(_part(stored["poses"], lengths, number), FINE, WAYPOINTS_ORDER)
     # Rounding is taken off the length of quaternions.
     quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     starts = _part(stored["starts"], shapes.prod(axis=1), number).reshape(shapes[number]) / FINE
     boxes = _part(stored["boxes"].T, stored["box_counts"], number).T
     rows = lengths[[order.index(owner) for owner in owners]]
     trajectories = {
-        method: read_only(_restored(_part(stored["joints"], rows, k), COARSE, TRAJECTORIES_ORDER))
+        method: read_only(_restore(_part(stored["joints"], rows, k), COARSE, TRAJECTORIES_ORDER))
         for k, (owner, method) in enumerate(zip(owners, methods, strict=True))
         if owner == name
     }
@@ -122,7 +122,7 @@ def _part(values: npt.NDArray[Any], lengths: npt.NDArray[np.int64], number: int)
     return values[..., end - lengths[number] : end]
 
 
-def _restored(packed: npt.NDArray[np.int32], scale: int, order: int) -> FloatArray:
+def _restore(packed: npt.NDArray[np.int32], scale: int, order: int) -> FloatArray:
     """A table of k rows from the differences of some order of whole multiples of 1 / scale. Shapes (c, k), (k, c)."""
     table = packed.T.astype(np.int64)
     for _ in range(order):

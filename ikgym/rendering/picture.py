@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from ikgym.obstacles.solids import bounded, in_space, outline
+from ikgym.obstacles.solids import cut_half_spaces, in_space, outline
 from ikgym.rendering.scene import (
     BLUE,
     GREEN,
@@ -169,7 +169,7 @@ class Picture:
         *obstacles, bodies, pair = self._solids
         centre, edge = self._view
         for line in obstacles:
-            line.set_data_3d(_outlines(bounded(scene.obstacles, edge, centre)).T)
+            line.set_data_3d(_outlines(cut_half_spaces(scene.obstacles, edge, centre)).T)
         bodies.set_data_3d(_outlines(scene.closest.bodies[0]).T)
         pair.set_data_3d(scene.closest.points[0].T)
 

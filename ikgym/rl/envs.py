@@ -16,7 +16,7 @@ from ikgym.options import checked_mask
 from ikgym.rl.task import Task
 from ikgym.rl.track import Features, Learner
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray, shortened
+from ikgym.validation import BoolArray, FloatArray, shorten
 from ikgym.vector_env import RedundantIKVectorEnv
 
 FIRST, LATER = np.ones(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_)
@@ -144,7 +144,7 @@ def make_vec(
 def _arguments(task: Any) -> dict[str, Any]:
     if not isinstance(task, Task):
         raise InvalidInputError(
-            f"task: expected an object of Task, got {shortened(task)}; ikgym.rl.make and make_vec take a scenario."
+            f"task: expected an object of Task, got {shorten(task)}; ikgym.rl.make and make_vec take a scenario."
         )
     return task.arguments()
 

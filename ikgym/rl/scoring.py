@@ -15,7 +15,7 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.rl.envs import LearningVectorEnv
 from ikgym.rl.ids import IDS, TaskEnv
 from ikgym.rl.task import Task
-from ikgym.validation import FloatArray, float_array, known_name, known_names, shortened, whole_number
+from ikgym.validation import FloatArray, float_array, known_name, known_names, shorten, whole_number
 
 #: Logarithms of 1 + cost of the yardsticks by split and id, one number an episode; ``python -m benchmarks.yardsticks``
 #: measures them, on the first episodes of each split.
@@ -69,7 +69,7 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
     kind = environment(name)
     seeds = scenarios.seeds(split, whole_number("episodes", episodes, at_least=1))
     if not callable(getattr(model, "predict", None)):
-        raise InvalidInputError(f"model: expected an object with the method predict, got {shortened(model)}.")
+        raise InvalidInputError(f"model: expected an object with the method predict, got {shorten(model)}.")
     total = np.zeros(len(seeds))
     steps = list(play(model, kind.task, seeds))
     for infos in steps[-(kind.task.counted or 0) :]:
@@ -87,7 +87,7 @@ def play(model: Any, task: Task, seeds: Sequence[int]) -> Iterator[dict[str, Any
     for _ in range(envs.scenario.steps):
         answer = model.predict(observation, state=state, episode_start=begun, deterministic=True)
         if not isinstance(answer, tuple) or len(answer) != 2:
-            raise InvalidInputError(f"model: expected predict to return action and state, got {shortened(answer)}.")
+            raise InvalidInputError(f"model: expected predict to return action and state, got {shorten(answer)}.")
         action, state = answer
         observation, *_, infos = envs.step(action)
         begun = np.zeros_like(begun)
@@ -111,7 +111,7 @@ def score(results: Mapping[str, Any], split: str = "validation") -> dict[str, Sc
             split.
     """
     if not isinstance(results, Mapping):
-        raise InvalidInputError(f"results: expected costs by the id of their environment, got {shortened(results)}.")
+        raise InvalidInputError(f"results: expected costs by the id of their environment, got {shorten(results)}.")
     known_names("environment", results, IDS)
     known_name("split", split, [name for name in scenarios.SPLITS if name in _yardsticks()])
     return {name: _score(name, value, split) for name, value in results.items()}

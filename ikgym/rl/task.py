@@ -12,7 +12,7 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import LARGEST, SMALLEST, flag, float_array, number, shortened, whole_number
+from ikgym.validation import LARGEST, SMALLEST, flag, float_array, number, shorten, whole_number
 
 #: Most observations that are shown side by side.
 MOST_HISTORY = 1000
@@ -115,5 +115,5 @@ def steps_ahead(ahead: Sequence[float], dt: float) -> tuple[int, ...]:
     """Times ahead in [s] as steps, at least one each; times that fall on the same step are shown once."""
     times = float_array("ahead", ahead)
     if times.ndim != 1 or not times.size or (np.diff(times, prepend=0.0) <= 0.0).any():
-        raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shortened(ahead)}.")
+        raise InvalidInputError(f"ahead: expected rising times above 0 in [s], got {shorten(ahead)}.")
     return tuple(dict.fromkeys(max(1, round(time / dt)) for time in times.tolist()))

@@ -15,7 +15,7 @@ from ikgym.rl.task import Task
 from ikgym.rl.track_kernels import MOST, track_rows
 from ikgym.rl.twists import twist_size
 from ikgym.scenarios import Scenario
-from ikgym.validation import BoolArray, FloatArray, shortened
+from ikgym.validation import BoolArray, FloatArray, shorten
 
 #: Error in [m] that costs 1: Δx of the cost.
 UNIT = 1e-3
@@ -102,7 +102,7 @@ class Learner:
         """
         raw = np.asarray(actions)
         if raw.dtype.kind not in "fiub" or raw.shape != self._shape:
-            raise InvalidInputError(f"action: expected numbers of shape {self._shape}, got {shortened(actions)}.")
+            raise InvalidInputError(f"action: expected numbers of shape {self._shape}, got {shorten(actions)}.")
         fractions: FloatArray = np.clip(raw.astype(np.float64), -1.0, 1.0) * self._fraction
         return fractions
 

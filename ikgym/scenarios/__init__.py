@@ -30,7 +30,7 @@ from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.scenario import Scenario, duration
 from ikgym.trajectories import PublishedPath
 from ikgym.trajectories.orientations import matrices
-from ikgym.validation import known_name, shortened, whole_number
+from ikgym.validation import known_name, shorten, whole_number
 
 __all__ = [
     "SPLITS",
@@ -171,7 +171,7 @@ def find(item: Scenario | str | os.PathLike[str]) -> Scenario:
     if not isinstance(item, str):
         raise InvalidInputError(
             "scenario: expected a Scenario, its name, a file ending in .toml or 'package.module:attribute', got "
-            f"{shortened(item)}."
+            f"{shorten(item)}."
         )
     if item not in _registry:
         if item.endswith(".toml"):

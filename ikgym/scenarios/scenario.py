@@ -44,7 +44,7 @@ from ikgym.validation import (
     gib,
     known_names,
     read_only,
-    shortened,
+    shorten,
     whole_number,
 )
 
@@ -124,7 +124,7 @@ class Scenario(Frozen):
 
     def __post_init__(self) -> None:
         self._settle(model=self.arm if self.model is None else self.model)
-        with about(f"Scenario {shortened(self.name)}"):
+        with about(f"Scenario {shorten(self.name)}"):
             super().__post_init__()
         collides = self.collisions is True or (self.collisions is None and self.obstacles not in ((), []))
         if collides and self.arm.urdf is not None:
@@ -175,7 +175,7 @@ class Scenario(Frozen):
         """Checks obstacles, collisions and proximity against the other parts."""
         where, obstacles, arm = f"obstacles of scenario {self.name!r}: expected", self.obstacles, self.arm
         if not isinstance(obstacles, (tuple, list)) or not all(isinstance(each, Obstacle) for each in obstacles):
-            raise InvalidInputError(f"{where} a list of obstacles, got {shortened(obstacles)}.")
+            raise InvalidInputError(f"{where} a list of obstacles, got {shorten(obstacles)}.")
         self._settle(obstacles=tuple(obstacles))
         if (count := sum(each.count for each in obstacles)) > MOST_OBSTACLES:
             raise InvalidInputError(f"{where} at most {MOST_OBSTACLES}, got {count}.")
@@ -241,7 +241,7 @@ class Scenario(Frozen):
         if self.plant.drive and "plant" not in changes and changes.get("dt", self.dt) != self.dt:
             raise InvalidInputError(
                 f"dt: expected {self.dt:g} s, to which the drives of low order of {self.name!r} belong, or another "
-                f"plant with it; got {shortened(changes['dt'])}."
+                f"plant with it; got {shorten(changes['dt'])}."
             )
         if "arm" in changes and self.model is self.arm:
             changes.setdefault("model", None)

@@ -13,7 +13,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError, list_names
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import FloatArray, Positive, shortened
+from ikgym.validation import FloatArray, Positive, shorten
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class RandomPublishedPath(Trajectory):
         members = problems.names(self.family) if isinstance(self.family, str) else ()
         if not members or not all(len(problems.get(name).starts) for name in members):
             raise InvalidInputError(
-                f"family: expected the beginning of names of problems with starts, got {shortened(self.family)}; "
+                f"family: expected the beginning of names of problems with starts, got {shorten(self.family)}; "
                 f"available: {list_names(problems.names())}."
             )
 

@@ -40,7 +40,7 @@ class TimeLaw(Frozen, abc.ABC):
         Raises:
             InvalidInputError: The duration is too short for the speed and the acceleration.
         """
-        shortest = self.shortest(path.length, *self._allowed(path))
+        shortest = self.shortest(path.length, *self._limits_along(path))
         if self.duration is None:
             return shortest
         if self.duration < shortest * (1.0 - 1e-12):
@@ -58,7 +58,7 @@ class TimeLaw(Frozen, abc.ABC):
             path: The path.
         """
         time = self.time(path)
-        return self.covered(np.clip(times, 0.0, time), time, path.length, self._allowed(path)[1])
+        return self.covered(np.clip(times, 0.0, time), time, path.length, self._limits_along(path)[1])
 
     @abc.abstractmethod
     def shortest(self, length: float, speed: float, acceleration: float) -> float:
@@ -68,7 +68,7 @@ class TimeLaw(Frozen, abc.ABC):
     def covered(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
         """The arc length covered after t in [s], if the whole length in [m] takes ``time``."""
 
-    def _allowed(self, path: Path) -> tuple[float, float]:
+    def _limits_along(self, path: Path) -> tuple[float, float]:
         """The largest speed and acceleration along the path."""
         if path.curvature == 0.0:
             return self.speed, self.acceleration

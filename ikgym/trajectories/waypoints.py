@@ -20,7 +20,7 @@ from ikgym.trajectories.paths.path import MOST_POINTS
 from ikgym.trajectories.time_laws import TIME_LAWS
 from ikgym.trajectories.timed_waypoints import TimedWaypoints
 from ikgym.trajectories.trajectory import Trajectory
-from ikgym.validation import LARGEST, FloatArray, about, frozen_array, known_name, shortened
+from ikgym.validation import LARGEST, FloatArray, about, frozen_array, known_name, shorten
 
 #: Largest size of a file in bytes.
 MOST_BYTES = 2**26
@@ -160,6 +160,6 @@ def _values(file: object, line: int, names: list[str], row: list[str]) -> list[f
         except ValueError:
             values.append(math.nan)
         if not math.isfinite(values[-1]):
-            got = shortened(cell) if cell.strip() else "nothing"
+            got = shorten(cell) if cell.strip() else "nothing"
             raise InvalidInputError(f"{file}, line {line}, column {name}: expected a finite number, got {got}.")
     return values

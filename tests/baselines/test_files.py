@@ -19,7 +19,7 @@ from baselines.files import (
     locked,
     read_arrays,
     read_json,
-    resumed,
+    read_resumable,
     write_json,
 )
 
@@ -92,14 +92,14 @@ def test_a_damaged_file_is_named(tmp_path, content, read):
 
 def test_only_the_same_work_is_resumed(tmp_path):
     file, about = tmp_path / "it.json", {"seed": 1, "steps": 5}
-    assert resumed(file, about) is None
+    assert read_resumable(file, about) is None
     write_json(file, {**about, "done": 3})
-    assert resumed(file, about) == {**about, "done": 3}
+    assert read_resumable(file, about) == {**about, "done": 3}
     with pytest.raises(ResultsError, match=r"it\.json differs in seed \(1 there, 2 here\)"):
-        resumed(file, {**about, "seed": 2})
+        read_resumable(file, {**about, "seed": 2})
     file.write_text("[]")
     with pytest.raises(ResultsError, match=r"it\.json is damaged"):
-        resumed(file, about)
+        read_resumable(file, about)
     with pytest.raises(ResultsError, match=r"it\.json already exists: continue with --resume"):
         check_flags(file, resume=False, overwrite=False)
     with pytest.raises(ResultsError, match="choose one"):

@@ -18,7 +18,7 @@ from ray.cluster_utils import Cluster
 
 from baselines.evaluate import evaluate
 from baselines.evaluation import run as playing
-from baselines.workers import ClusterError, Workers, finished
+from baselines.workers import ClusterError, Workers, run_units
 from tests.baselines.test_workers import needs_proc, wait_for
 
 # Ray leaves files and sockets to the garbage collector.
@@ -115,7 +115,7 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     given = {"scenarios": "varga7-random", "policies": "dls", "episodes": EPISODES + 1, "steps": 50}
     alone = evaluate(**given)
     monkeypatch.setattr(playing, "BLOCK", 1)
-    monkeypatch.setattr("baselines.workers.finished", lambda function, *given: finished(work, *given))
+    monkeypatch.setattr("baselines.workers.run_units", lambda function, *given: run_units(work, *given))
     monkeypatch.setattr(playing, "_check_versions", kill_half_way)
     rows = evaluate(**given, cluster="ray", out=tmp_path)
     assert len(done) == len(set(done)) == EPISODES
@@ -123,7 +123,7 @@ def test_one_of_two_nodes_is_killed_half_way(cluster, monkeypatch, tmp_path, cap
     assert [untimed(row) for row in rows] == [untimed(row) for row in alone]
     assert [row.time_p50_us is None for row in rows] == [False] + [True] * EPISODES
     # To start nodes takes long: so here is also seen what they say of units that they cannot read.
-    ((_, future),) = finished(work, [Unknown()], Workers(cluster="ray"))
+    ((_, future),) = run_units(work, [Unknown()], Workers(cluster="ray"))
     with pytest.raises(ClusterError, match=r"cannot do its work: .*no_such_module.* Install ikgym and the packages"):
         future.result()
 

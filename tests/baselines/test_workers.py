@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from baselines.workers import Workers, finished
+from baselines.workers import Workers, run_units
 from ikgym.exceptions import InvalidInputError, MissingDependencyError, UnknownNameError
 from ikgym.kernels import threads
 
@@ -62,7 +62,7 @@ def waits(folder):
 
 
 def results(*arguments, **options):
-    with contextlib.closing(finished(*arguments, **options)) as done:
+    with contextlib.closing(run_units(*arguments, **options)) as done:
         return {unit: future.result() for unit, future in done}
 
 

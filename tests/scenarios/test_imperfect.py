@@ -5,7 +5,7 @@ import pytest
 
 import ikgym
 from baselines.fingerprints import fingerprint
-from baselines.oracle.stripped import ideal, stripped
+from baselines.oracle.stripped import ideal, strip_plant
 
 NAMES = ikgym.scenarios.names("plants")
 PLAIN = ikgym.scenarios.get("panda-ideal")
@@ -47,7 +47,7 @@ def test_the_arm_that_moves_begins_on_its_path(name):
         error = scenario.task.error(scenario.nominal(seed)[0], scenario.task.coordinates(*arm.forward(start)))
         assert abs(error).max() < 1e-9
         assert np.array_equal(start, nominal[row]) == plain
-        np.testing.assert_array_equal(stripped(scenario, seed).start_of(seed), start)
+        np.testing.assert_array_equal(strip_plant(scenario, seed).start_of(seed), start)
 
 
 def test_an_arm_that_is_kept_is_jogged_and_a_start_that_is_given_is_not():

@@ -18,7 +18,7 @@ from baselines.paths import Branch, Retimed, Survey, survey
 from baselines.paths.late import DELAY, LAG, play_late
 from baselines.paths.motion import OTHERS, PREFERRED
 from baselines.paths.planning import PLAYER, Plan, plan
-from baselines.paths.retiming import refusal, retimed
+from baselines.paths.retiming import find_retimed, refusal
 from baselines.paths.speeds import fastest, speed_limit
 from baselines.paths.survey import REACHED, Contact, follows
 from ikgym import tasks
@@ -78,7 +78,7 @@ def _work(options: Options, _: str) -> None:
     if options.branch is not None:
         row = whole_number("--branch", options.branch, at_least=1, at_most=len(every.branches)) - 1
         found = dataclasses.replace(every, branches=every.branches[row : row + 1])
-    driven = retimed(found, fastest=options.fastest)
+    driven = find_retimed(found, fastest=options.fastest)
     close = driven is not None and follows(driven.motion)
     planned = None if close else plan(found, fastest=options.fastest)
     driven = (planned and planned.motion) or driven
@@ -275,7 +275,7 @@ def _free_about_z(found: Survey) -> list[str]:
         free = survey(found.scenario.replace(task=tasks.get("axis"), initial_pose=None), reserve=found.reserve)
     except InvalidInputError:
         return []
-    driven = retimed(free)
+    driven = find_retimed(free)
     if driven is None:
         return []
     return [

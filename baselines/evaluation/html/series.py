@@ -12,7 +12,7 @@ import numpy.typing as npt
 from baselines.evaluation.log import TrajectoryLog, frame_rows
 from ikgym.arms.limits import BOUNDS, at_limits
 from ikgym.exceptions import printable
-from ikgym.obstacles.solids import bounded, in_space, surface
+from ikgym.obstacles.solids import cut_half_spaces, in_space, surface
 from ikgym.validation import FloatArray
 
 #: Bytes that the series of a page may take together, as far as each of them has :data:`FEWEST` rows.
@@ -86,7 +86,7 @@ def _surfaces(log: TrajectoryLog) -> tuple[dict[str, npt.NDArray[Any]], int]:
     The ``surface`` has vertices in the frames that carry them in [m], each with the number of its frame (v, 4); the
     ``triangles`` have three of them each (t, 3).
     """
-    solids, of_bodies = bounded(log["solids"], PLATE * float(np.abs(log["joint_points"]).max())), 0
+    solids, of_bodies = cut_half_spaces(log["solids"], PLATE * float(np.abs(log["joint_points"]).max())), 0
     vertices, triangles, known = [], [], 0
     for solid, carrier in zip(solids, log["carriers"].tolist(), strict=True):
         points, faces = surface(solid[12:], STRETCHES)

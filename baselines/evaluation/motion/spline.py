@@ -131,13 +131,13 @@ def stop(arm: Arm, q: FloatArray, dt: float, jerk_limit: FloatArray | None = Non
         return q
     if jerk_limit is not None:
         slowing = _slowing(qdot, dt * arm.acceleration_limit, dt * dt * jerk_limit)
-        return _stopped(arm, q, dt, slowing)
+        return _append_stop(arm, q, dt, slowing)
     hardest = np.abs(np.diff(qdot, axis=0, prepend=np.zeros_like(q[:1]))).max(axis=0) / dt
     moving = last != 0.0
     periods = max(FEWEST, math.ceil(STEEPEST * (np.abs(last[moving]) / hardest[moving]).max() / dt))
     u = np.arange(1, periods + 1) / periods
     slowing = np.outer(1.0 - u**2 * (3.0 - 2.0 * u), last)
-    return _stopped(arm, q, dt, slowing)
+    return _append_stop(arm, q, dt, slowing)
 
 
 def _slowing(qdot: FloatArray, most: FloatArray, steps: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ def _slowing(qdot: FloatArray, most: FloatArray, steps: FloatArray) -> FloatArra
     return np.array(out)
 
 
-def _stopped(arm: Arm, q: FloatArray, dt: float, slowing: FloatArray) -> FloatArray:
+def _append_stop(arm: Arm, q: FloatArray, dt: float, slowing: FloatArray) -> FloatArray:
     out = np.vstack([q, q[-1] + dt * np.cumsum(slowing, axis=0)])
     _check(arm, out[-1], (q[-1] - q[-2]) / dt)
     return out

@@ -27,7 +27,7 @@ def short(name: str) -> str:
     return name.removeprefix("faitli3-")
 
 
-def solved(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> Episode:
+def play_method(runs: Runs, name: str | Scenario = STRETCHED, **parameters: Any) -> Episode:
     """The paper's method, with the parameters of its Table 1 unless others are given."""
     return runs.play(name, METHOD, **parameters)
 

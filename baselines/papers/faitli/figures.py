@@ -9,13 +9,13 @@ from matplotlib.ticker import MaxNLocator
 
 from baselines.evaluation.plots import style
 from baselines.papers.comparisons import sign_changes
-from baselines.papers.drawing import Curve, Panel, compared, picture
+from baselines.papers.drawing import Curve, Panel, compare_coordinates, picture
 from baselines.papers.faitli.episodes import (
     SHOULDER,
     STRETCHED,
     jacobians,
+    play_method,
     singular_values,
-    solved,
 )
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs, nominal_joints, times
@@ -29,7 +29,7 @@ def _path(runs: Runs) -> Figure:
     figure = style.figure(4.8)
     axes = figure.add_subplot(projection="3d")
     handles: list[Artist] = []
-    looks = {"calculated": (solved(runs).pose, "-", 1.2), "nominal": (nominal, (0, (4, 2)), 1.8)}
+    looks = {"calculated": (play_method(runs).pose, "-", 1.2), "nominal": (nominal, (0, (4, 2)), 1.8)}
     for number, (points, line, width) in enumerate(looks.values()):
         handles += axes.plot(*points.T, color=style.looks(number)["color"], linestyle=line, lw=width)
     for label, name in zip(("xlabel", "ylabel", "zlabel"), LABELS, strict=True):
@@ -43,7 +43,7 @@ def _path(runs: Runs) -> Figure:
 
 
 def _error(runs: Runs) -> Figure:
-    scenario, episode = runs.scenario(STRETCHED), solved(runs)
+    scenario, episode = runs.scenario(STRETCHED), play_method(runs)
     time, error = times(scenario), scenario.nominal()[1:] - episode.pose
     components = [Curve(label, time, 1e3 * error[:, i]) for i, label in enumerate(LABELS)]
     length = [Curve("length", time, 1e3 * episode.position_error)]
@@ -53,8 +53,8 @@ def _error(runs: Runs) -> Figure:
 
 def _joint(runs: Runs, joint: int) -> Figure:
     scenario, one = runs.scenario(STRETCHED), slice(joint, joint + 1)
-    q, nominal = solved(runs).q[:, one], nominal_joints(scenario)[:, one]
-    panels = compared([f"$q_{joint + 1}$ [rad]"], times(scenario), q, nominal, ("calculated", "nominal"))
+    q, nominal = play_method(runs).q[:, one], nominal_joints(scenario)[:, one]
+    panels = compare_coordinates([f"$q_{joint + 1}$ [rad]"], times(scenario), q, nominal, ("calculated", "nominal"))
     return picture(f"$q_{joint + 1}$, nominal and calculated", panels, height=3.2)
 
 
@@ -63,7 +63,7 @@ def _eigenvalues(runs: Runs) -> Figure:
     rows: list[list[Panel]] = []
     for name in (STRETCHED, SHOULDER):
         scenario = runs.scenario(name)
-        time, paths = times(scenario), {"calculated": solved(runs, name).q, "nominal": nominal_joints(scenario)}
+        time, paths = times(scenario), {"calculated": play_method(runs, name).q, "nominal": nominal_joints(scenario)}
         panels, singular = [], []
         for label, q in paths.items():
             jacobian = jacobians(scenario, q)

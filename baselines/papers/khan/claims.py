@@ -27,17 +27,17 @@ from baselines.papers.khan.episodes import (
     errors_of_variants,
     manufactured_arms,
     no_worse,
+    rotation_vectors,
     sound,
     spectra,
     three_seconds,
-    turned,
 )
-from baselines.papers.paper import Figures, Finding, scaled
+from baselines.papers.paper import Figures, Finding, in_unit
 from baselines.papers.runs import Runs
 from ikgym import Plant
 
 
-def _weighted(runs: Runs, name: str, weights: Variant) -> tuple[Errors, Errors]:
+def _errors_with_weights(runs: Runs, name: str, weights: Variant) -> tuple[Errors, Errors]:
     """The settled errors of the method without weights, and with them."""
     return errors(runs, name), errors(runs, name, **weights)
 
@@ -52,7 +52,7 @@ def _before_and_after(before: Errors, after: Errors) -> Figures:
 def level_path(runs: Runs) -> Finding:
     """Variation of the height, and lean of the axis of rotation, along the nominal path."""
     nominal = runs.scenario(Q1).nominal()
-    height, lean = float(np.ptp(nominal[:, 11])), float(np.abs(turned(nominal)[:, :2]).max())
+    height, lean = float(np.ptp(nominal[:, 11])), float(np.abs(rotation_vectors(nominal)[:, :2]).max())
     return Finding(height < 1e-12 and lean < 1e-12, {"X₃ [m]": height, "lean [rad]": lean})
 
 
@@ -84,13 +84,13 @@ def sixty_inner_steps(runs: Runs) -> Finding:
 
 def f_weights_orientation_down(runs: Runs) -> Finding:
     """Orientation error without and with ℱ."""
-    before, after = _weighted(runs, Q1, LOOSE)
+    before, after = _errors_with_weights(runs, Q1, LOOSE)
     return Finding(larger(after.angle, before.angle), _before_and_after(before, after))
 
 
 def f_couples(runs: Runs) -> Finding:
     """Position error without and with ℱ."""
-    before, after = _weighted(runs, Q1, LOOSE)
+    before, after = _errors_with_weights(runs, Q1, LOOSE)
     return Finding(differ(after.position, before.position), {"[mm]": (1e3 * before.position, 1e3 * after.position)})
 
 
@@ -101,7 +101,7 @@ def subtle_differences(runs: Runs) -> Finding:
     return Finding(None, {"[rad]": float(apart.max()), "of [rad]": motion})
 
 
-def _blocked(runs: Runs, name: str) -> Finding:
+def _ranges_of_blocked(runs: Runs, name: str) -> Finding:
     """Ranges of joints 7 and 8, without and with 𝒲."""
     free, held = (np.ptp(at_points(runs, name, **w).q[:, 6:], axis=0) for w in ({}, BLOCKED))
     return Finding(bool((held < 0.1 * free).all()), {"without [rad]": free.tolist(), "with [rad]": held.tolist()})
@@ -109,12 +109,12 @@ def _blocked(runs: Runs, name: str) -> Finding:
 
 def w_blocks_joints(runs: Runs) -> Finding:
     """On the path by joint 1."""
-    return _blocked(runs, Q1)
+    return _ranges_of_blocked(runs, Q1)
 
 
 def w_keeps_precision(runs: Runs) -> Finding:
     """Against the run without 𝒲, and against the path's extent."""
-    before, after = _weighted(runs, Q1, BLOCKED)
+    before, after = _errors_with_weights(runs, Q1, BLOCKED)
     share = after.largest_position / extent(runs.scenario(Q1).nominal()[:, 9:])
     holds = {"against the run without W": not after.worse(before), "against the extent": share < SAME}
     return Finding(holds, {**_before_and_after(before, after), "of the extent [%]": 100.0 * share})
@@ -123,7 +123,7 @@ def w_keeps_precision(runs: Runs) -> Finding:
 def general_path(runs: Runs) -> Finding:
     """Ranges of the nominal coordinates, and whether the axis of the rotation from home changes."""
     nominal = runs.scenario(Q7Q8).nominal()
-    ranges, vectors = np.ptp(nominal[:, 9:], axis=0), turned(nominal)
+    ranges, vectors = np.ptp(nominal[:, 9:], axis=0), rotation_vectors(nominal)
     rank = np.linalg.svd(vectors, compute_uv=False)
     largest = float(np.linalg.norm(vectors, axis=1).max())
     holds = bool((ranges > 0.0).all()) and rank[1] > 1e-6 * rank[0]
@@ -143,14 +143,14 @@ def acceptable_solutions(runs: Runs) -> Finding:
 
 def w_degrades_q7_and_q8(runs: Runs) -> Finding:
     """Errors without and with 𝒲."""
-    before, after = _weighted(runs, Q7Q8, BLOCKED)
+    before, after = _errors_with_weights(runs, Q7Q8, BLOCKED)
     holds = larger(after.position, before.position) and larger(after.angle, before.angle)
     return Finding(holds, _before_and_after(before, after))
 
 
 def w_reduces_q7_and_q8(runs: Runs) -> Finding:
     """On the path by joints 7 and 8."""
-    return _blocked(runs, Q7Q8)
+    return _ranges_of_blocked(runs, Q7Q8)
 
 
 def stable_and_convergent(runs: Runs) -> Finding:
@@ -238,7 +238,7 @@ def _compensates(runs: Runs, error: str, unit: str) -> Finding:
         uncorrected, *corrected = (getattr(e, error) for e in runs_of.values())
         holds |= {f"{name}, {how}": e < uncorrected for how, e in zip(list(runs_of)[1:], corrected, strict=True)}
         figures[name] = [uncorrected, *corrected]
-    return Finding(holds, scaled(figures, unit))
+    return Finding(holds, in_unit(figures, unit))
 
 
 def compensates_position(runs: Runs) -> Finding:
@@ -277,13 +277,13 @@ def no_exploration(runs: Runs) -> Finding:
         "the method": shares[METHOD] == 0.0,
         "against inversion": all(shares[name] > shares[METHOD] for name in CLOSED_LOOPS),
     }
-    return Finding(holds, scaled(shares, "%"))
+    return Finding(holds, in_unit(shares, "%"))
 
 
 def less_hectic(runs: Runs) -> Finding:
     """Peak joint velocities and travel compared with two closed loops."""
     peaks = {name: peak_speed(runs.play(Q7Q8, name)) for name in (METHOD, *CLOSED_LOOPS)}
-    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), scaled(peaks, "rad/s"))
+    return Finding(all(peaks[METHOD] < peaks[name] for name in CLOSED_LOOPS), in_unit(peaks, "rad/s"))
 
 
 def compensates_manufacturing(runs: Runs) -> Finding:
@@ -297,7 +297,7 @@ def compensates_manufacturing(runs: Runs) -> Finding:
             mine = [errors(runs, arm, **variant).position for arm in arms]
             holds[f"{1e3 * size:g} mm, {how}"] = all(a < b for a, b in zip(mine, left, strict=True))
             figures[f"{1e3 * size:g}:"] += mine
-    return Finding(holds, scaled(figures, "mm"))
+    return Finding(holds, in_unit(figures, "mm"))
 
 
 def needs_precise_measurement(runs: Runs) -> Finding:

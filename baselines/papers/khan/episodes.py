@@ -47,7 +47,7 @@ class Points(NamedTuple):
     q: FloatArray
     diagnostics: dict[str, FloatArray]
 
-    def settled(self, values: FloatArray) -> FloatArray:
+    def after_start(self, values: FloatArray) -> FloatArray:
         """Values from 1 s on, after the initial error has vanished; all values in a shorter trial."""
         late = values[self.time > 1.0]
         return late if len(late) else values
@@ -84,7 +84,7 @@ class Errors(NamedTuple):
 def errors(runs: Runs, name: str | Scenario, policy: str = METHOD, **parameters: Any) -> Errors:
     """The errors of a policy."""
     points = at_points(runs, name, policy, **parameters)
-    position, angle = points.settled(points.position_error), points.settled(points.orientation_error)
+    position, angle = points.after_start(points.position_error), points.after_start(points.orientation_error)
     return Errors(rms(position), rms(angle), float(position.max()), float(angle.max()))
 
 
@@ -101,7 +101,7 @@ def spectra(runs: Runs, name: str, **parameters: Any) -> FloatArray:
     return np.sort(np.linalg.eigvals(np.swapaxes(model, 1, 2) @ arm).real, axis=1)
 
 
-def turned(pose: FloatArray) -> FloatArray:
+def rotation_vectors(pose: FloatArray) -> FloatArray:
     """Rotation vectors from the home orientation, in [rad], of task coordinates. Shape (k, 3)."""
     return np.array([rotation_vector(rotation) for rotation in pose[:, :9].reshape(-1, 3, 3)])
 

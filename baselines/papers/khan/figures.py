@@ -7,8 +7,18 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.papers.drawing import Curve, Panel, compared, picture
-from baselines.papers.khan.episodes import BLOCKED, LOOSE, Q1, Q7Q8, Points, Variant, at_points, spectra, turned
+from baselines.papers.drawing import Curve, Panel, compare_coordinates, picture
+from baselines.papers.khan.episodes import (
+    BLOCKED,
+    LOOSE,
+    Q1,
+    Q7Q8,
+    Points,
+    Variant,
+    at_points,
+    rotation_vectors,
+    spectra,
+)
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs
 from ikgym.validation import FloatArray
@@ -19,10 +29,11 @@ WEIGHTED = {"task_weights": "; F = 0.5 for the orientation", "joint_weights": ";
 
 def _tracking(title: str, points: Points, _other: Points, _nominal: FloatArray) -> Figure:
     actual, nominal = (
-        np.column_stack([pose[:, 9:], np.linalg.norm(turned(pose), axis=1)]) for pose in (points.pose, points.nominal)
+        np.column_stack([pose[:, 9:], np.linalg.norm(rotation_vectors(pose), axis=1)])
+        for pose in (points.pose, points.nominal)
     )
     labels = ("$X_1$ [m]", "$X_2$ [m]", "$X_3$ [m]", "rotation from\nhome [rad]")
-    return picture(title, compared(labels, points.time, actual, nominal), columns=2, height=2.3)
+    return picture(title, compare_coordinates(labels, points.time, actual, nominal), columns=2, height=2.3)
 
 
 def _errors(title: str, points: Points, _other: Points, _nominal: FloatArray) -> Figure:
@@ -44,7 +55,7 @@ def _errors(title: str, points: Points, _other: Points, _nominal: FloatArray) ->
 def _joints(title: str, points: Points, other: Points, nominal: FloatArray) -> Figure:
     """The path of each joint; with weights and without."""
     labels = [f"$q_{i + 1}$ [rad]" for i in range(points.q.shape[1])]
-    panels = compared(labels, points.time, points.q, nominal, ("solution", "generated the nominal path"))
+    panels = compare_coordinates(labels, points.time, points.q, nominal, ("solution", "generated the nominal path"))
     if other is not points:
         panels = [
             panel._replace(curves=[*panel.curves, Curve("solution without weights", points.time, other.q[:, i])])

@@ -9,7 +9,7 @@ import numpy as np
 
 from baselines.papers.comparisons import SAME, YANK, extent, rms
 from baselines.papers.faitli.episodes import REGULAR, TRAJECTORIES, jacobians, short, singular_places
-from baselines.papers.paper import Finding, scaled
+from baselines.papers.paper import Finding, in_unit
 from baselines.papers.runs import Runs, nominal_joints
 from baselines.status import Status
 from ikgym.scenarios import Scenario
@@ -102,14 +102,14 @@ def stagnation(runs: Runs) -> Finding:
             speeds = [float(qdot[yanked, joint].mean()) for qdot in (inversion, method)]
             figures[f"{short(scenario.name)}, q{joint + 1}"] = speeds
     holds = bool(figures) and all(YANK * method < inversion for inversion, method in figures.values())
-    return Finding(holds, scaled(figures, "rad/s"))
+    return Finding(holds, in_unit(figures, "rad/s"))
 
 
 def damping_distorts(runs: Runs) -> Finding:
     """Errors away from singular points."""
     policies = ("moore_penrose", "dls", "fixed_point")
     errors = {policy: rms(runs.play(TRAJECTORIES[1], policy).position_error) for policy in policies}
-    return Finding(errors["dls"] > errors["moore_penrose"], scaled(errors, "µm"))
+    return Finding(errors["dls"] > errors["moore_penrose"], in_unit(errors, "µm"))
 
 
 def distortion(runs: Runs) -> Finding:
@@ -124,7 +124,7 @@ def distortion(runs: Runs) -> Finding:
 def two_joints(runs: Runs) -> Finding:
     """Share of all configurations with the real parts of both eigenvalues of one sign."""
     positive, negative = planar_signs(runs)
-    return Finding(max(positive, negative) < 1.0, scaled({"positive": positive, "negative": negative}, "%"))
+    return Finding(max(positive, negative) < 1.0, in_unit({"positive": positive, "negative": negative}, "%"))
 
 
 def sign_works_for_two_joints(runs: Runs) -> Finding:
@@ -143,4 +143,4 @@ def sign_variant(runs: Runs) -> Finding:
         tried = [best(runs, scenario, t) for t in SIGNS]
         holds[short(scenario.name)] = not any(one.success for one in tried)
         figures[short(scenario.name)] = [one.error for one in tried]
-    return Finding(holds, scaled(figures, "mm"))
+    return Finding(holds, in_unit(figures, "mm"))

@@ -9,7 +9,7 @@ import numpy as np
 
 from baselines.episodes import Episode
 from baselines.papers.comparisons import CONSIDERABLY, above, larger, largest_error, peak_speed, rms
-from baselines.papers.paper import Figures, Finding, scaled
+from baselines.papers.paper import Figures, Finding, in_unit
 from baselines.papers.runs import Runs, nominal_joints
 from baselines.papers.varga.episodes import (
     ALPHAS,
@@ -20,11 +20,11 @@ from baselines.papers.varga.episodes import (
     READINGS,
     SLOW,
     at_limit,
-    diverged,
     fast,
     fluctuation,
     largest_jump,
     nominal_angles,
+    share_diverged,
     slow,
     smooth,
     time_of_step,
@@ -47,12 +47,12 @@ def _all_readings(runs: Runs) -> dict[str, Episode]:
 def _by_arm(shares: dict[str, float]) -> Figures:
     """Shares by the reading of the arm; α restarted, unshifted and shifted, then α kept."""
     arms = ("varga7", "literal")
-    return scaled({arm: [share for label, share in shares.items() if label.startswith(arm)] for arm in arms}, "%")
+    return in_unit({arm: [share for label, share in shares.items() if label.startswith(arm)] for arm in arms}, "%")
 
 
 def printed_step(runs: Runs) -> Finding:
     """Share of the steps that diverge with the printed bounds of α, in all readings."""
-    shares = {label: diverged(episode) for label, episode in _all_readings(runs).items()}
+    shares = {label: share_diverged(episode) for label, episode in _all_readings(runs).items()}
     return Finding({label: share == 0.0 for label, share in shares.items()}, _by_arm(shares))
 
 
@@ -70,11 +70,11 @@ def offline_only(runs: Runs) -> Finding:
         "analytic gradients": {"tolerance": 0.0, "gradient": "analytic"},
     }
     times = {label: time_of_step(runs, **parameters) for label, parameters in descents.items()}
-    times["in NumPy"] = _interpreted(runs) * 450
-    return Finding(above(times, 1e-3), scaled(times, "ms"))
+    times["in NumPy"] = _time_interpreted(runs) * 450
+    return Finding(above(times, 1e-3), in_unit(times, "ms"))
 
 
-def _interpreted(runs: Runs, iterations: int = 15) -> float:
+def _time_interpreted(runs: Runs, iterations: int = 15) -> float:
     """Processor time of one iteration of the interpreted descent in [s]."""
     scenario = runs.scenario(FAST)
     q, nominal = np.zeros(scenario.joints), scenario.nominal()[1:3]  # the path starts at home
@@ -90,7 +90,7 @@ def time_proportional(runs: Runs) -> Finding:
     """Time per iteration in steps of 50 to 450 iterations."""
     numbers = (50, 150, 250, 350, 450)
     times = [time_of_step(runs, tolerance=0.0, iterations=number) / number for number in numbers]
-    return Finding(not larger(max(times), min(times)), scaled({"": times}, "µs"))
+    return Finding(not larger(max(times), min(times)), in_unit({"": times}, "µs"))
 
 
 def multipliers_cost_more(runs: Runs) -> Finding:
@@ -117,13 +117,13 @@ def acceptable_precision(runs: Runs) -> Finding:
 def slow_is_finer(runs: Runs) -> Finding:
     """Largest position errors on the fast and the slow path."""
     a, b = largest_error(fast(runs)), largest_error(slow(runs))
-    return Finding(larger(a, b), scaled({"fast": a, "slow": b}, "mm"))
+    return Finding(larger(a, b), in_unit({"fast": a, "slow": b}, "mm"))
 
 
 def fast_fluctuates(runs: Runs) -> Finding:
     """Largest change of a velocity in one step over the peak."""
     jumps = {name: largest_jump(runs.play(FAST, METHOD, **alpha).qdot) for name, alpha in ALPHAS.items()}
-    return Finding(above(jumps, 0.1), scaled(jumps, "%"))
+    return Finding(above(jumps, 0.1), in_unit(jumps, "%"))
 
 
 def _fluctuations(qdot: FloatArray) -> dict[str, float]:
@@ -177,11 +177,11 @@ def smoothing_calms(runs: Runs) -> Finding:
 def smoothing_errs(runs: Runs) -> Finding:
     """Largest position errors before and after smoothing."""
     a, b = largest_error(fast(runs)), largest_error(smooth(runs))
-    return Finding(larger(b, a, CONSIDERABLY), scaled({"before": a, "after": b}, "mm"))
+    return Finding(larger(b, a, CONSIDERABLY), in_unit({"before": a, "after": b}, "mm"))
 
 
 def skew_part_determines(runs: Runs) -> Finding:
     """Share of the nominal paths beyond 90°: the skew part is sin θ times the axis, the same for θ and π − θ."""
     angles = {name: nominal_angles(runs, path) for name, path in (("fast", FAST), ("slow", SLOW))}
     shares = {name: float((angle > 0.5 * np.pi).mean()) for name, angle in angles.items()}
-    return Finding(max(shares.values()) == 0.0, scaled(shares, "%"))
+    return Finding(max(shares.values()) == 0.0, in_unit(shares, "%"))

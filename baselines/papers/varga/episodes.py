@@ -64,7 +64,7 @@ def smooth(runs: Runs) -> Episode:
     return runs.play(FAST, "smoothed", policy=METHOD)
 
 
-def diverged(episode: Episode) -> float:
+def share_diverged(episode: Episode) -> float:
     """The share of control steps that diverged."""
     return float((episode.status == Status.DIVERGED).mean())
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.lib.stride_tricks import sliding_window_view
 
 from baselines.episodes import Episode
-from baselines.papers.drawing import Curve, Panel, compared, picture
+from baselines.papers.drawing import Curve, Panel, compare_coordinates, picture
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs, nominal_joints, times
 from baselines.papers.varga.episodes import FAST, METHOD, SLOW, fast, slow, smooth
@@ -44,7 +44,7 @@ def _orientation(title: str, runs: Runs, name: str, episode: Episode) -> Figure:
 def _joints(title: str, runs: Runs, name: str, episode: Episode) -> Figure:
     prismatic = runs.scenario(name).arm.prismatic
     labels = [f"$q_{i + 1}$ [{'m' if p else 'rad'}]" for i, p in enumerate(prismatic)]
-    panels = compared(labels, times(runs.scenario(name)), episode.q, nominal_joints(runs.scenario(name)))
+    panels = compare_coordinates(labels, times(runs.scenario(name)), episode.q, nominal_joints(runs.scenario(name)))
     return picture(title, panels, columns=2, height=1.6)
 
 

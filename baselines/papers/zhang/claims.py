@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from baselines.papers.comparisons import SAME, above, falls, larger, largest_error, peak_speed, rms
-from baselines.papers.paper import Finding, scaled
+from baselines.papers.paper import Finding, in_unit
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
     HELIX,
@@ -22,16 +22,16 @@ from baselines.papers.zhang.episodes import (
     TARGETS,
     at_rest,
     constant,
-    drawn,
+    draw_targets,
     iterates,
     jacobians_used,
-    met,
     of_link,
     predictive,
     ramp_errors,
     rank_correlation,
     settled_error,
     settled_from,
+    share_met,
     sugihara,
 )
 from baselines.solvers.levenberg_marquardt.damping import typical_link
@@ -75,7 +75,7 @@ def static_error(runs: Runs) -> Finding:
     for damping in (0.2, 2.0, 20.0):
         error, formula = ramp_errors(runs, 1e-3, damping)
         apart[f"λ = {damping:g}"] = float(np.linalg.norm(error - formula) / np.linalg.norm(formula))
-    return Finding(max(apart.values()) < SAME, scaled({"": list(apart.values())}, "%"))
+    return Finding(max(apart.values()) < SAME, in_unit({"": list(apart.values())}, "%"))
 
 
 def no_static_error(runs: Runs) -> Finding:
@@ -94,7 +94,7 @@ def _falls_with_lambda(values: Mapping[str, list[float]], unit: str, peaks: Mapp
         for name, by_lambda in {**values, **peaks}.items()
         for i, pair in enumerate(itertools.pairwise(by_lambda))
     }
-    return Finding(falls(pairs), {**scaled(values, unit), **scaled(peaks, "rad/s")})
+    return Finding(falls(pairs), {**in_unit(values, unit), **in_unit(peaks, "rad/s")})
 
 
 def robustness(runs: Runs) -> Finding:
@@ -176,14 +176,14 @@ def model_free(runs: Runs) -> Finding:
             wrong = [error(source.drawn_plant(seed).arm) for seed in range(3)]
             holds[f"{name}, {which}"] = not larger(max(wrong), exact)
             figures[name].append(max(wrong))
-    return Finding(holds, scaled(figures, "mm"))
+    return Finding(holds, in_unit(figures, "mm"))
 
 
 def levenberg_marquardt(runs: Runs) -> Finding:
     """Largest distance of ten iterates from those of the normal equations."""
     apart = {}
     for name in TARGETS:
-        targets = drawn(runs, name)
+        targets = draw_targets(runs, name)
         damping = 1e-3 * typical_link(targets.scenario.arm) ** 2
         ours, theirs = iterates(targets, rule="sugihara", weight=1.0, damping=damping), sugihara(targets, damping)
         apart[name] = max(float(np.abs(a.q - b).max()) for a, b in zip(ours, theirs, strict=True))
@@ -192,7 +192,7 @@ def levenberg_marquardt(runs: Runs) -> Finding:
 
 def _correlations(runs: Runs, name: str) -> tuple[float, float]:
     """Rank correlation of the error with the following change of J and with cond(J), until the error is rounding."""
-    pairs = list(itertools.pairwise(iterates(drawn(runs, name))))
+    pairs = list(itertools.pairwise(iterates(draw_targets(runs, name))))
     error = np.concatenate([a.error for a, _ in pairs])
     change = np.concatenate([np.linalg.norm(b.jacobian - a.jacobian, axis=(1, 2)) for a, b in pairs])
     condition = np.concatenate([np.linalg.cond(a.jacobian) for a, _ in pairs])
@@ -220,7 +220,7 @@ def error_and_condition(runs: Runs) -> Finding:
 def _targets_met(runs: Runs, rules: Mapping[str, Mapping[str, Any]]) -> dict[str, list[float]]:
     """Shares of the targets that are met with λ = 0, and with each rule, by set of targets."""
     with_none = {"λ = 0": {"rule": "constant", "damping": 0.0}, **rules}
-    return {targets: [met(runs, targets, rule)[0] for rule in with_none.values()] for targets in TARGETS}
+    return {targets: [share_met(runs, targets, rule)[0] for rule in with_none.values()] for targets in TARGETS}
 
 
 def rule_14(runs: Runs) -> Finding:
@@ -238,8 +238,8 @@ def rule_14(runs: Runs) -> Finding:
         holds[f"{a:g}, {b:g}"] = all(min(shares) >= shares[0] - 0.005 for shares in found.values())
         for targets, (undamped, *shares) in found.items():
             figures.setdefault(targets, [undamped]).append(min(shares))
-        left.append(max(met(runs, "stretched", rule)[1] for rule in rules.values()))
-    return Finding(holds, {**scaled(figures, "%"), **scaled({"left": left}, "µm")})
+        left.append(max(share_met(runs, "stretched", rule)[1] for rule in rules.values()))
+    return Finding(holds, {**in_unit(figures, "%"), **in_unit({"left": left}, "µm")})
 
 
 def rule_18(runs: Runs) -> Finding:
@@ -248,7 +248,7 @@ def rule_18(runs: Runs) -> Finding:
         f"{a}, {b}": {"rule": "threshold", "growth": a, "decay": b, "damping": 1e-3}
         for a, b in ((1.1, 1.02), (1.1, 1.2), (2.0, 2.0))
     }
-    return Finding(None, scaled(_targets_met(runs, rules), "%"))
+    return Finding(None, in_unit(_targets_met(runs, rules), "%"))
 
 
 def look_up(runs: Runs) -> Finding:
@@ -260,7 +260,7 @@ def look_up(runs: Runs) -> Finding:
         "(37)": {"rule": "condition"},
         "(37), milder": {"rule": "condition", "dampings": (0.0, 1e-12, 1e-11, 1e-10)},
     }
-    return Finding(None, scaled(_targets_met(runs, rules), "%"))
+    return Finding(None, in_unit(_targets_met(runs, rules), "%"))
 
 
 def constant_lambda(runs: Runs) -> Finding:

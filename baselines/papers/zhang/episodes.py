@@ -169,13 +169,13 @@ class Targets:
 
     def error(self, q: FloatArray) -> FloatArray:
         """Task error at joint coordinates of shape (rows, n). Shape (rows, e)."""
-        return np.asarray(self.scenario.task.error(self.coordinates, self._reached(q)))
+        return np.asarray(self.scenario.task.error(self.coordinates, self._coordinates_at(q)))
 
-    def solved(self, policy: SolverPolicy) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    def solve(self, policy: SolverPolicy) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Joint coordinates after one period of a policy, in [rad], and its statuses. Shapes (rows, n) and (rows,)."""
         rows = len(self.q)
         nominal = self.coordinates[:, None]
-        batch = Batch(self.q, np.zeros_like(self.q), self._reached(self.q), nominal, np.ones((rows, 1)))
+        batch = Batch(self.q, np.zeros_like(self.q), self._coordinates_at(self.q), nominal, np.ones((rows, 1)))
         solution = policy.solve(batch, policy.memory(rows))
         return self.q + solution.qdot * self.scenario.dt, solution.status
 
@@ -183,11 +183,11 @@ class Targets:
         """Jacobian of the task. Shape (rows, e, n)."""
         return np.asarray(self.scenario.model.jacobian(q)[:, : self.scenario.task.error_size])
 
-    def _reached(self, q: FloatArray) -> FloatArray:
+    def _coordinates_at(self, q: FloatArray) -> FloatArray:
         return np.asarray(self.scenario.task.coordinates(*self.scenario.model.forward(q)))
 
 
-def drawn(runs: Runs, name: str) -> Targets:
+def draw_targets(runs: Runs, name: str) -> Targets:
     """1000 targets of a set of :data:`TARGETS`; fewer in a trial."""
     of, far, straight = TARGETS[name]
     scenario, rng = runs.scenario(of), np.random.default_rng(0)
@@ -199,14 +199,14 @@ def drawn(runs: Runs, name: str) -> Targets:
     return Targets(scenario, q, np.asarray(scenario.task.coordinates(*scenario.model.forward(goal))))
 
 
-def met(runs: Runs, name: str, rule: Mapping[str, Any]) -> tuple[float, float]:
+def share_met(runs: Runs, name: str, rule: Mapping[str, Any]) -> tuple[float, float]:
     """The share of a set of targets that `mfac` meets to δ = 1e-10 in 500 iterations, and the median error left.
 
     The dampings of the rule for λ are in l².
     """
-    targets, square = drawn(runs, name), of_link(runs, TARGETS[name][0], 1.0)
+    targets, square = draw_targets(runs, name), of_link(runs, TARGETS[name][0], 1.0)
     in_metres = {key: (square * np.array(rule[key])).tolist() for key in ("damping", "dampings") if key in rule}
-    q, status = targets.solved(make("mfac", targets.scenario, **{**rule, **in_metres}))
+    q, status = targets.solve(make("mfac", targets.scenario, **{**rule, **in_metres}))
     left = np.linalg.norm(targets.error(q), axis=1)
     return float((status == Status.CONVERGED).mean()), float(np.median(left))
 
@@ -224,7 +224,7 @@ def iterates(targets: Targets, **parameters: object) -> list[Iterate]:
     path = [targets.q]
     for i in range(1, ITERATIONS + 1):
         policy = make("mfac", targets.scenario, iterations=i, tolerance=0.0, **parameters)
-        path.append(targets.solved(policy)[0])
+        path.append(targets.solve(policy)[0])
     return [Iterate(q, np.linalg.norm(targets.error(q), axis=1), targets.jacobian(q)) for q in path]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.papers.drawing import Curve, Panel, compared, picture
+from baselines.papers.drawing import Curve, Panel, compare_coordinates, picture
 from baselines.papers.paper import PaperFigure
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import HELIX, LINE, iterative, jacobians_used, lambdas_used, outputs, predictive
@@ -40,7 +40,9 @@ def _with_start(title: str, panels: Sequence[Panel], *, height: float = 1.9) -> 
 def _tracking(runs: Runs) -> Figure:
     scenario, episode = runs.scenario(HELIX), predictive(runs)
     actual, nominal = outputs(scenario, episode), scenario.nominal()
-    panels = compared([f"{name} [m]" for name in AXES], _samples(actual), actual, nominal, ("actual", "desired"))
+    panels = compare_coordinates(
+        [f"{name} [m]" for name in AXES], _samples(actual), actual, nominal, ("actual", "desired")
+    )
     return _with_start("Example 1, tracking of the helix", panels)
 
 

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from baselines.episodes import Episode
 from baselines.papers.comparisons import SAME, below, extent, falls, larger, roughness
-from baselines.papers.paper import Finding, scaled
+from baselines.papers.paper import Finding, in_unit
 from baselines.papers.runs import Runs
 from baselines.papers.zhang.episodes import (
     HELIX,
@@ -50,7 +50,7 @@ def one_formula(runs: Runs) -> Finding:
         stacked = np.linalg.solve(whole.T @ whole + damping * np.eye(3 * n), whole.T @ np.tile(error, n))  # (21)
         total = stacked.reshape(n, 3).sum(axis=0)
         apart[f"λ = {damping:g}"] = float(np.linalg.norm(total - made) / np.linalg.norm(made))
-    return Finding(below(apart, SAME), scaled({"": list(apart.values())}, "%"))
+    return Finding(below(apart, SAME), in_unit({"": list(apart.values())}, "%"))
 
 
 def one_point(runs: Runs) -> Finding:
@@ -76,7 +76,7 @@ def held_points(runs: Runs) -> Finding:
         held = along_the_helix(runs, "mfapc", 5, hold=True, horizon=5, damping=damping)
         shares = np.linalg.norm(held - one, axis=1) / np.linalg.norm(one, axis=1)
         apart[f"λ = {damping:g}"] = float(np.median(shares))
-    return Finding(below(apart, SAME), scaled({"": list(apart.values())}, "%"))
+    return Finding(below(apart, SAME), in_unit({"": list(apart.values())}, "%"))
 
 
 def closer_tracking(runs: Runs) -> Finding:
@@ -85,7 +85,7 @@ def closer_tracking(runs: Runs) -> Finding:
         "(44)": (settled_error(adaptive(runs)), settled_error(predictive(runs))),
         "λ = 2": (settled_error(constant(runs, HELIX, 2.0)), settled_error(constant(runs, HELIX, 2.0, 5))),
     }
-    return Finding(falls(pairs), scaled({f"{name}:": pair for name, pair in pairs.items()}, "mm"))
+    return Finding(falls(pairs), in_unit({f"{name}:": pair for name, pair in pairs.items()}, "mm"))
 
 
 def _by_path_and_lambda(runs: Runs, figure: Callable[[str, Episode], float], paths: tuple[str, ...]) -> Pairs:
@@ -102,7 +102,7 @@ def _changes(pairs: Pairs) -> Finding:
     """Whether a figure falls, with the changes that count, as shares of the larger value."""
     holds = falls(pairs)
     shares = {name: (pairs[name][1] - pairs[name][0]) / max(pairs[name]) for name in holds}
-    figures = dict(sorted(scaled({f"{name}:": share for name, share in shares.items()}, "%").items()))
+    figures = dict(sorted(in_unit({f"{name}:": share for name, share in shares.items()}, "%").items()))
     return Finding(holds, {**figures, f"of {len(pairs)} compared, unchanged": len(pairs) - len(holds)})
 
 
@@ -175,7 +175,7 @@ def falling_lambda(runs: Runs) -> Finding:
     """Largest error after the transient with λ held at its peak, and falling."""
     peak = float(lambdas_used(predictive(runs)).max())
     held, free = settled_error(constant(runs, HELIX, round(peak, 4), 5)), settled_error(predictive(runs))
-    return Finding(larger(held, free), scaled({"held": held, "falling": free}, "mm"))
+    return Finding(larger(held, free), in_unit({"held": held, "falling": free}, "mm"))
 
 
 def excellent(runs: Runs) -> Finding:
@@ -187,7 +187,7 @@ def excellent(runs: Runs) -> Finding:
         "line": float(line.position_error.max() / np.linalg.norm(ways[:3])),
         "turn": float(line.orientation_error.max() / np.linalg.norm(ways[3:])),
     }
-    return Finding(max(shares.values()) < SAME, scaled(shares, "%"))
+    return Finding(max(shares.values()) < SAME, in_unit(shares, "%"))
 
 
 def ten_iterations(runs: Runs) -> Finding:
@@ -201,7 +201,7 @@ def whole_horizon(runs: Runs) -> Finding:
     """Samples at which (40) is unmet after 10 and 100 iterations, and the error that is left."""
     unmet = [float((iterative(runs, iterations=n).status == Status.ITERATION_LIMIT).mean()) for n in (10, 100)]
     left = unmet_of_the_way(runs)
-    figures = scaled({"unmet": unmet, "left": left}, "%")
+    figures = in_unit({"unmet": unmet, "left": left}, "%")
     return Finding({"to δ": unmet[0] == 0.0, "to 1 %": left < SAME}, figures)
 
 

@@ -135,7 +135,7 @@ class Predicted(NamedWrapper):
         outer, inside = self.split(memory)
         kept = PredictedMemory(*[array.copy() for array in outer])
         off = self._observe(batch, kept)
-        shown = self._shown(batch, kept)
+        shown = self._base_observation(batch, kept)
         model_change = kept.arm_qdot[:, 0] - kept.arm_qdot[:, 1]
         step = self.ask(shown, self.inner.recall(inside, shown.qdot, model_change))
         qdot = np.empty_like(batch.q)
@@ -201,7 +201,7 @@ class Predicted(NamedWrapper):
         offset_rows(problem.model.chain, problem.task.kind, share, seen, self._hypotheses.lags, tuple(kept), off)
         return off
 
-    def _shown(self, batch: Batch, kept: PredictedMemory) -> Batch:
+    def _base_observation(self, batch: Batch, kept: PredictedMemory) -> Batch:
         """Observations of the base policy: the arm that it moves, as late as its command will be."""
         preview, rows, lead = self.inner.preview, len(batch.q), kept.lead
         q, qdot = kept.arm_q[:, 0].copy(), kept.arm_qdot[:, 0].copy()

@@ -196,7 +196,7 @@ def rule_defaults(rule: str, given: Mapping[str, Any], arm: Arm) -> dict[str, An
                 f"{name}: expected nothing, as the damping rule {rule!r} has only {', '.join(numbers)}; got {value!r}."
             )
     scales = {name: length ** LENGTH_POWERS.get(name, 0) for name in numbers}
-    return {name: _scaled(default, scales[name]) for name, default in numbers.items() if given[name] is None}
+    return {name: _scale(default, scales[name]) for name, default in numbers.items() if given[name] is None}
 
 
 def damping_law(rule: str, parameters: Mapping[str, Any]) -> DampingLaw:
@@ -234,9 +234,9 @@ def typical_link(arm: Arm) -> float:
     return float(lengths[lengths > 0.0].mean()) if lengths.any() else 1.0
 
 
-def _scaled(value: Any, factor: float) -> Any:
+def _scale(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
-        return tuple(_scaled(v, factor) for v in value)
+        return tuple(_scale(v, factor) for v in value)
     return value if isinstance(value, bool) or factor == 1.0 else value * factor
 
 

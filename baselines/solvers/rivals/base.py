@@ -97,10 +97,10 @@ class Rival(SolverPolicy, abc.ABC):
                 f"{self.name}: expected a scenario of the task {' or '.join(map(repr, self.tasks))}, "
                 f"got {self.problem.task.name!r}."
             )
-        self.imported()
+        self.import_package()
 
     @classmethod
-    def imported(cls, module: str | None = None) -> Any:
+    def import_package(cls, module: str | None = None) -> Any:
         """The package, or a module of it.
 
         Raises:

@@ -46,7 +46,7 @@ class Roboplan(TaskProgram):
 
     def make_step(self) -> Step:
         """See :meth:`Rival.make_step`."""
-        core, kinematics = self.imported("roboplan.core"), self.imported()
+        core, kinematics = self.import_package("roboplan.core"), self.import_package()
         solids, dt, n = solids_of(self.problem), self.problem.dt, self.model.joints
         scene = self._scene(core, solids)
         settings = kinematics.OinkSettings()

@@ -90,7 +90,7 @@ class SolverProgram(TaskProgram, abc.ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known = self.imported("qpsolvers").available_solvers
+        known = self.import_package("qpsolvers").available_solvers
         if self.solver not in known:
             raise UnknownNameError("solver of quadratic programs", self.solver, tuple(known))
 
@@ -121,10 +121,10 @@ class Pink(SolverProgram):
 
     def make_step(self) -> Step:
         """See :meth:`Rival.make_step`."""
-        pink, pinocchio = self.imported(), self.imported("pinocchio")
+        pink, pinocchio = self.import_package(), self.import_package("pinocchio")
         model = pinocchio.buildModelFromXML(urdf(self.model))
         solids = solids_of(self.problem)
-        geometry = geometry_model(solids, pinocchio, self.imported("coal")) if solids.pairs else None
+        geometry = geometry_model(solids, pinocchio, self.import_package("coal")) if solids.pairs else None
         configuration = pink.Configuration(model, model.createData(), np.zeros(model.nq), collision_model=geometry)
         frame = pink.tasks.FrameTask(TIP, *self.frame_costs, lm_damping=self.lm_damping, gain=self.gain)
         posture = [pink.tasks.PostureTask(self.posture_cost, gain=self.share)] if self.posture_cost else []
@@ -179,7 +179,7 @@ class Mink(SolverProgram):
 
     def make_step(self) -> Step:
         """See :meth:`Rival.make_step`."""
-        mink, mujoco = self.imported(), self.imported("mujoco")
+        mink, mujoco = self.import_package(), self.import_package("mujoco")
         solids = solids_of(self.problem)
         model = mujoco.MjModel.from_xml_string(mjcf(self.model, solids))
         configuration = mink.Configuration(model)

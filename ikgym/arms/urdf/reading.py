@@ -27,7 +27,7 @@ from ikgym.validation import (
     known_name,
     known_names,
     rotation_matrix,
-    shortened,
+    shorten,
 )
 
 logger = logging.getLogger("ikgym")
@@ -179,7 +179,7 @@ def _folders(packages: object) -> tuple[Path, ...]:
     """Folders of packages, as absolute paths."""
     given = [packages] if isinstance(packages, (str, PathLike)) else packages
     if not isinstance(given, (tuple, list)) or not all(isinstance(one, (str, PathLike)) for one in given):
-        raise InvalidInputError(f"packages: expected a folder or a list of folders, got {shortened(packages)}.")
+        raise InvalidInputError(f"packages: expected a folder or a list of folders, got {shorten(packages)}.")
     folders = tuple(Path(one).resolve() for one in given)
     for folder in folders:
         if not folder.is_dir():

@@ -127,7 +127,7 @@ REFUSED = [
     *((lambda number=number: Bilinear((1, 5), number), "damping: ") for number in (0.0, float("nan"), "much")),
     (lambda: Bilinear((1, 5)).outputs(SKEW), "task: expected another than skew coordinates"),
     (lambda: Bilinear.from_json({"damping": None}), "damping: expected a finite number above 0"),
-    (lambda: network((2, 2), "relo"), "no activation 'relo'"),
+    (lambda: network((2, 2), "relo"), "no choice of activation 'relo'"),
 ]
 
 

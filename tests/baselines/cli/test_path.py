@@ -186,7 +186,7 @@ def worse_qp(monkeypatch):
         more = 5e-4 if solver == "qp" else 0.0
         return dataclasses.replace(motion, position_error=motion.position_error + more)
 
-    monkeypatch.setattr(module, "played", worse)
+    monkeypatch.setattr(module, "play_from", worse)
     monkeypatch.setattr(module, "starts", lambda scenario: starts(scenario)[:1])
 
 

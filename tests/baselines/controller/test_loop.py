@@ -11,7 +11,7 @@ import ikgym
 from baselines import Controller, Drives, Guards
 from baselines.controller import StopReason
 from baselines.controller.drives import half_period
-from docs.loop import DrivenArm, peaks, played
+from docs.loop import DrivenArm, peaks, play
 from ikgym.exceptions import InvalidInputError
 from tests.baselines.controller.circles import circle
 
@@ -20,7 +20,7 @@ LAG = 0.02
 
 def check(controller, scenario, drives, first=1.0):
     """Errors after the first second, and commands of each joint, as the issue of this loop wants them."""
-    errors, commands = played(controller, scenario, drives)
+    errors, commands = play(controller, scenario, drives)
     assert controller.stopped is None
     assert errors[round(first / scenario.dt) :].max() < 1e-4
     # The inverse of a lag that is guessed may take one period at the acceleration limit, whatever the joint needs.
@@ -55,13 +55,13 @@ def test_commands_keep_the_limits_of_jerk(drives):
     """On drives that are identified, with a reference that starts at full acceleration; without them they do not."""
     scenario = circle("panda", seconds=1.5).replace(jerk_limit=None)
     controller = Controller(scenario)
-    errors, commands = played(controller, scenario, drives)
+    errors, commands = play(controller, scenario, drives)
     assert controller.stopped is None
     assert max(jerks(commands, scenario)) <= 1.0 + 1e-6
     assert errors[1300:].max() < 5e-5
     if drives.time_constant:
         free = scenario.replace(jerk_limit=np.inf)
-        assert jerks(played(Controller(free), free, drives)[1], free)[1] > 1.0
+        assert jerks(play(Controller(free), free, drives)[1], free)[1] > 1.0
 
 
 def test_a_stop_keeps_the_limits_of_jerk():
@@ -148,7 +148,7 @@ def test_known_drives(drives):
 def test_wrong_drives_are_followed_late_and_calmly():
     """Twelve periods that nobody knows of: the gain is stable, and errors stay below those of the lag itself."""
     scenario = circle("panda", 4e-3, seconds=2.0)
-    errors, commands = played(Controller(scenario, drives=Drives(0, LAG)), scenario, Drives(12, LAG))
+    errors, commands = play(Controller(scenario, drives=Drives(0, LAG)), scenario, Drives(12, LAG))
     assert 1e-5 < errors[250:].max() < 0.1 * (12 * scenario.dt + LAG)
     # The inverse of a lag that is guessed may take one period at the acceleration limit, whatever the joint needs.
     step = 1.01 * scenario.dt * Guards().acceleration(scenario.model)
@@ -159,7 +159,7 @@ def test_the_longest_drives_that_are_found():
     """Twelve periods in which nothing moves are no broken sensor."""
     scenario = circle("pr2", 4e-3, seconds=2.0)
     controller, drives = Controller(scenario), Drives(12, 0.04)
-    errors, _ = played(controller, scenario, drives)
+    errors, _ = play(controller, scenario, drives)
     assert controller.stopped is None
     assert errors[250:].max() < 1e-4
     np.testing.assert_allclose(controller.drives.delay, 12, atol=0.1)
@@ -175,7 +175,7 @@ def test_drives_that_differ_by_joint(dt, known):
     """Lags of 5 to 40 ms: each joint has its model; those known are no worse than those identified."""
     scenario = circle("panda", dt, seconds=2.4)
     controller = Controller(scenario, drives=SPREAD if known else "identify")
-    errors, _ = played(controller, scenario, SPREAD)
+    errors, _ = play(controller, scenario, SPREAD)
     assert controller.stopped is None
     assert errors[round(2.0 / dt) :].max() < 5e-6
     if not known:
@@ -186,7 +186,7 @@ def test_drives_that_differ_by_joint(dt, known):
 def test_drives_beyond_the_range_are_reported_as_at_least():
     scenario = circle("panda", 4e-3, seconds=2.0)
     controller = Controller(scenario, guards=Guards(position_error=None, orientation_error=None))
-    played(controller, scenario, Drives((3, 3, 3, 15, 3, 3, 3), (0.02, 0.02, 0.02, 0.02, 0.02, 0.06, 0.02)))
+    play(controller, scenario, Drives((3, 3, 3, 15, 3, 3, 3), (0.02, 0.02, 0.02, 0.02, 0.02, 0.06, 0.02)))
     assert controller.drives.at_least == (False, False, False, True, False, True, False)
     assert re.search("^joint 4: at least 1[23].* periods of delay", str(controller.drives), re.MULTILINE)
 
@@ -217,7 +217,7 @@ def test_nothing_is_said_of_drives_that_have_not_moved():
         controller.step(scenario.start, None, still)
     assert controller.stopped is None
     assert controller.drives is None
-    played(controller, scenario.replace(steps=100), Drives())
+    play(controller, scenario.replace(steps=100), Drives())
     np.testing.assert_allclose(controller.drives.delay, 0.0, atol=0.01)
     assert np.max(controller.drives.time_constant or 0.0) < 0.1 * scenario.dt
     controller.reset()

@@ -119,13 +119,13 @@ def test_a_measurement_that_was_killed_continues(tmp_path, monkeypatch):
     table = [line | {"jerk": "limited"}, line | {"jerk": "free"}]
     monkeypatch.setattr(reflexes, "WORK", tmp_path)
     monkeypatch.setattr(reflexes, "lines", lambda _: table)
-    first, second = reflexes.measured()
+    first, second = reflexes.measure()
     assert (first["stopped"], second["stopped"], second["by"]) == (0, 1, "jerk")
     assert 0.0 < first["error_rms_mm"] < first["error_max_mm"] < 1.0
     made = []
     monkeypatch.setattr(reflexes, "drive", lambda *_, jerk: made.append(jerk) or reflexes.Run(0.1, "velocity"))
     table[1]["runs"] = "2"
-    again = reflexes.measured()
+    again = reflexes.measure()
     assert (made, again[0]) == ([False], first)
     assert (again[1]["stopped"], again[1]["by"]) == (2, "jerk velocity")
 

@@ -11,8 +11,8 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import test_sets
 from baselines.files import ResultsError
 from baselines.oracle import best_known
-from baselines.oracle.best_known import MARGIN, Record, beaten, cost, episode_hash, lookup, read, record
-from baselines.oracle.stripped import stripped
+from baselines.oracle.best_known import MARGIN, Record, beaten_record, cost, episode_hash, lookup, read, record
+from baselines.oracle.stripped import strip_plant
 from ikgym.kernels import cost as cost_kernels
 from ikgym.plant import Plant
 
@@ -92,12 +92,12 @@ def test_another_arm_has_another_record(file):
     plain = ikgym.scenarios.get("panda-ideal").replace(steps=20)
     calibrated = plain.replace(plant=Plant(zero=1e-3))
     noisy = calibrated.replace(plant=Plant(zero=1e-3, pose_noise=1e-3, command_delay=2))
-    record([one(stripped(calibrated, 0), 10.0)], file)
+    record([one(strip_plant(calibrated, 0), 10.0)], file)
     assert cost(calibrated, 0) == cost(noisy, 0) == 10.0
     assert best_known.costs(noisy, [0, 1]) == [10.0, None]
     assert lookup(calibrated, 0, arm_seed=3) is None
     assert lookup(plain, 0) is None
-    record([dataclasses.replace(one(stripped(calibrated, 0, 3), 20.0), scenario="another arm")], file)
+    record([dataclasses.replace(one(strip_plant(calibrated, 0, 3), 20.0), scenario="another arm")], file)
     assert (cost(noisy, 0, 3), cost(noisy, 0)) == (20.0, 10.0)
 
 
@@ -130,19 +130,19 @@ def test_no_ratio_to_nothing(file):
     assert cost(short(), 0) is None
     (row,) = evaluate(short(), "dls")
     assert row.cost_ratio is None
-    assert beaten(dataclasses.replace(row, total_cost=0.0)) is None
+    assert beaten_record(dataclasses.replace(row, total_cost=0.0)) is None
 
 
 def test_a_record_is_beaten_by_more_than_rounding(file):
     (row,) = evaluate(short(), "dls")
-    assert beaten(row) is None
+    assert beaten_record(row) is None
     known = one(short(), row.total_cost)
     record([known], file)
     for share, expected in ((1.0, None), (1.0 - 0.9 * MARGIN, None), (1.0 - 1.1 * MARGIN, known), (2.0, None)):
-        assert beaten(dataclasses.replace(row, total_cost=share * row.total_cost)) == expected
-    assert beaten(dataclasses.replace(row, total_cost=math.nan)) is None
-    assert beaten(dataclasses.replace(row, total_cost=0.1, seed=1)) is None
-    assert beaten(dataclasses.replace(row, total_cost=0.1, fingerprint="0" * 12)) is None
+        assert beaten_record(dataclasses.replace(row, total_cost=share * row.total_cost)) == expected
+    assert beaten_record(dataclasses.replace(row, total_cost=math.nan)) is None
+    assert beaten_record(dataclasses.replace(row, total_cost=0.1, seed=1)) is None
+    assert beaten_record(dataclasses.replace(row, total_cost=0.1, fingerprint="0" * 12)) is None
 
 
 #: Records that as many polished paths have led to, from different starts, are not expected to be beaten.
@@ -156,7 +156,7 @@ DOUBTFUL = [r.scenario for r in read() if r.seed == 0 and r.cost > 1e-9 and r.sp
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DOUBTFUL)
 def test_no_foresight_beats_a_record(name):
-    better = [row.total_cost for row in evaluate(name, "rhc_foresight") if beaten(row)]
+    better = [row.total_cost for row in evaluate(name, "rhc_foresight") if beaten_record(row)]
     assert not better, f"write them down with: {best_known.UPDATE}"
 
 

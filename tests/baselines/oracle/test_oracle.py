@@ -14,7 +14,7 @@ from baselines.fingerprints import episode_hash
 from baselines.oracle import Search, Start, best_known, cache, local_search, solve
 from baselines.oracle.episode import EpisodeProblem
 from baselines.oracle.optimum import LOCAL_SEARCH, RANDOM
-from baselines.oracle.stripped import stripped
+from baselines.oracle.stripped import strip_plant
 from baselines.policy import Problem
 from baselines.solvers.receding_horizon.newton.minimise import NewtonSettings
 from ikgym.exceptions import InvalidInputError, UnknownNameError
@@ -311,10 +311,10 @@ def test_the_arm_that_moves_is_polished(monkeypatch):
     (first, again), other = (solve(calibrated, 5, QUICK) for _ in range(2)), solve(calibrated, 5, QUICK, arm_seed=2)
     assert first.found_by == cache.IDEAL
     assert first.cost == again.cost != other.cost
-    _, played = EpisodeProblem.of(stripped(calibrated, 5), 5).play(first.qdot)
+    _, played = EpisodeProblem.of(strip_plant(calibrated, 5), 5).play(first.qdot)
     assert played == first.cost
     searched = calibrated.arm.forward(solve(short("panda-ideal"), 5, QUICK).q)
-    for there, wanted in zip(stripped(calibrated, 5).arm.forward(began[-1]), searched, strict=True):
+    for there, wanted in zip(strip_plant(calibrated, 5).arm.forward(began[-1]), searched, strict=True):
         assert_allclose(there, wanted, rtol=0, atol=1e-8)
 
 

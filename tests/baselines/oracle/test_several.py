@@ -6,7 +6,7 @@ import pytest
 
 from baselines.episodes import Seeds
 from baselines.oracle import Search, several
-from baselines.oracle.cache import kept
+from baselines.oracle.cache import read_cached
 from baselines.oracle.several import Wanted, find_all
 from baselines.workers import WorkerError, Workers
 from ikgym import scenarios
@@ -34,9 +34,9 @@ def test_they_are_the_same_and_kept_here(pool, monkeypatch, tmp_path):
     monkeypatch.setenv("IKGYM_CACHE", str(tmp_path))
     alone = costs(find_all(wanted(cached=False)))
     assert costs(find_all(wanted(cached=False), FAR)) == alone
-    assert kept(wanted()[0].scenario, 7_000_000, HOW) is None
+    assert read_cached(wanted()[0].scenario, 7_000_000, HOW) is None
     assert costs(find_all(wanted(), FAR)) == alone
-    assert kept(wanted()[0].scenario, 7_000_000, HOW).cost == alone[7_000_000]
+    assert read_cached(wanted()[0].scenario, 7_000_000, HOW).cost == alone[7_000_000]
     asked = len(pool.units)
     assert asked == 2 + 1 + 2  # one was lost
     assert costs(find_all(wanted(), FAR)) == alone

@@ -7,7 +7,7 @@ import pytest
 import ikgym
 from baselines.papers import PAPERS, ledger
 from baselines.papers.comparisons import differ, falls
-from baselines.papers.paper import Claim, Finding, Paper, scaled
+from baselines.papers.paper import Claim, Finding, Paper, in_unit
 from baselines.papers.runs import Runs
 
 
@@ -27,7 +27,7 @@ def test_a_claim_is_contradicted_only_if_it_fails_in_all_readings(holds, wanted)
 
 
 def test_figures_in_words():
-    figures = {**scaled({"fast": 0.0537, "slow": [1e-3, 2e-3]}, "mm"), "[rad]": 0.25, "steps": 7}
+    figures = {**in_unit({"fast": 0.0537, "slow": [1e-3, 2e-3]}, "mm"), "[rad]": 0.25, "steps": 7}
     assert Finding(True, figures).text == "fast 53.7 mm; slow 1, 2 mm; 0.25 rad; steps 7"
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from baselines.papers.runs import Runs
 from baselines.papers.zhang import claims, predictive
-from baselines.papers.zhang.episodes import SHARES, TARGETS, at_rest, drawn
+from baselines.papers.zhang.episodes import SHARES, TARGETS, at_rest, draw_targets
 from baselines.registry import make
 from baselines.status import Status
 
@@ -17,9 +17,9 @@ def trial():
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_targets_with_a_converged_solution_are_met(trial, name):
-    targets = drawn(trial, name)
+    targets = draw_targets(trial, name)
     assert len(targets.q) == 200
-    q, status = targets.solved(make("mfac", targets.scenario))
+    q, status = targets.solve(make("mfac", targets.scenario))
     met = status == Status.CONVERGED
     assert met.mean() > 0.9
     assert np.linalg.norm(targets.error(q), axis=1)[met].max() <= 1e-9

@@ -9,7 +9,7 @@ import pytest
 
 import baselines
 from baselines.paths import retime, survey
-from baselines.paths.motion import ideal, path_duration, played
+from baselines.paths.motion import ideal, path_duration, play_from
 from baselines.paths.starts import starts
 from baselines.paths.survey import branch_of, follows
 from baselines.paths.timing import Timing
@@ -71,7 +71,7 @@ def test_a_path_that_no_start_leads_along_clear():
 def test_a_start_from_which_bodies_touch():
     """The path of another solver: `qp` keeps clear."""
     scenario = blocked(None)
-    motion = played(ideal(scenario), scenario.start_of()[None])
+    motion = play_from(ideal(scenario), scenario.start_of()[None])
     stopped = dataclasses.replace(motion, stopped=np.where(np.arange(len(motion.stopped)) >= 900, 1.0, 0.0)[:, None])
     contact = branch_of(scenario, stopped, Timing.uniform(path_duration(scenario), 1.0)).contact
     assert contact.touched

@@ -10,7 +10,7 @@ import ikgym
 from baselines.controller import Guards, StopReason
 from baselines.paths import Branch, retime, survey
 from baselines.paths.late import play_late
-from baselines.paths.motion import ideal, path_duration, played
+from baselines.paths.motion import ideal, path_duration, play_from
 from baselines.paths.survey import FOLLOWED, REACHED
 from baselines.paths.timing import Timing
 from docs.retimed import PATHS, by_one_factor, faster
@@ -90,7 +90,7 @@ def test_a_long_path_has_coarse_plays():
     scenario = ikgym.scenarios.get("panda-circle")
     slow = scenario.replace(trajectory=Timing.uniform(path_duration(scenario), 200.0).of(scenario.trajectory), dt=0.5)
     begin = slow.start_of()[None]
-    assert played(ideal(slow.replace(steps=None), start=begin[0]), begin).position_error.max() < 5e-3
+    assert play_from(ideal(slow.replace(steps=None), start=begin[0]), begin).position_error.max() < 5e-3
 
 
 def test_a_reserve_is_left_to_feedback():

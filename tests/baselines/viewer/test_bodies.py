@@ -5,7 +5,7 @@ import pytest
 
 from baselines.viewer.replay import Stage
 from baselines.viewer.session import Session
-from ikgym.obstacles.solids import bounded, closest
+from ikgym.obstacles.solids import closest, cut_half_spaces
 from tests.bodied import blocked, crowd
 
 transforms = pytest.importorskip("viser.transforms")
@@ -28,7 +28,7 @@ def test_bodies_obstacles_and_the_line_are_where_the_kernels_have_them(viewer):
     for number, link in enumerate(scenario.arm.bodies.links):
         at = place([*arm._frames[:link], drawn._bodies[number]]).translation()
         np.testing.assert_allclose(at, found.bodies[0, number, 9:12], atol=1e-5)
-    for handle, box in zip(drawn._obstacles, bounded(boxes, drawn._edge), strict=True):
+    for handle, box in zip(drawn._obstacles, cut_half_spaces(boxes, drawn._edge), strict=True):
         np.testing.assert_allclose(handle.position, box[9:12], atol=1e-6)
         np.testing.assert_allclose(transforms.SO3(np.array(handle.wxyz)).as_matrix().ravel(), box[:9], atol=1e-6)
     np.testing.assert_allclose(drawn._line.points, found.points, atol=1e-6)

@@ -6,7 +6,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout
-from baselines.oracle.stripped import stripped
+from baselines.oracle.stripped import strip_plant
 from ikgym import Plant
 from ikgym.exceptions import InvalidInputError
 
@@ -44,7 +44,7 @@ def test_a_payload_is_known_once_it_is_there():
     drawn = PLAIN.replace(plant=plant).drawn_plant(SEED)
     same = Plant(payload=5e-4 * (2.0 + drawn.context[0]), payload_step=30)
     assert drawn.payload == pytest.approx(same.payload, rel=1e-12)
-    assert stripped(PLAIN.replace(plant=plant), SEED).plant == Plant(payload=drawn.payload, payload_step=30)
+    assert strip_plant(PLAIN.replace(plant=plant), SEED).plant == Plant(payload=drawn.payload, payload_step=30)
     episode = told(plant)
     np.testing.assert_allclose(episode.q, told(same).q, rtol=1e-9)
     assert episode.position_error[28] < 1e-5
