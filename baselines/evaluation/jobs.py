@@ -94,7 +94,7 @@ class Options(Frozen):
     plant costs each policy."""
     leaderboard: bool = False
     """Write a table into the folder, too, in which policies are ranked by cost ratio, with intervals, and plots of cost
-    against time and foresight. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
+    against time. Agents in DIR/seed-N/ are training seeds of one agent and share a line, DIR."""
     severities: Annotated[tuple[float, ...], tyro.conf.arg(metavar="S …")] = ()
     """Play one scenario with its plant at all pairs of these severities, of unknown properties (calibration, payload,
     camera) and of the drives (lag, delay), and write a map of cost ratios. 1 is the plant itself, in panda-field the

@@ -46,14 +46,12 @@ def ranking(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
 
 
 def write_ranking(out: pathlib.Path, rows: Iterable[Row], policies: Sequence[str]) -> None:
-    """Writes table.csv, table.md, and plots of cost against time and against foresight."""
+    """Writes table.csv, table.md, and a plot of cost against time for each scenario."""
     lines = ranking(rows, policies)
     write(out / "table.csv", to_csv(lines).encode())
     write(out / "table.md", f"{markdown(lines)}\n".encode())
     for scenario, here in lines.groupby("scenario", sort=False):
         write(out / f"cost-time-{slug(str(scenario))}.png", png(comparison.cost_time(here, str(scenario))))
-    by_name = lines.assign(name=lines.policy.str.partition(":")[0])
-    write(out / "foresight.png", png(comparison.foresight(by_name, "Cost against foresight", "name")))
 
 
 def write_map(out: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], policies: Sequence[str]) -> None:

@@ -43,7 +43,7 @@ PAGE = "report.html"
 #: Files of a folder that are replaced by --overwrite; other files are left alone.
 WRITTEN = (
     *("results.json", "results.csv", "README.md", PAGE, "series/*/*.npz"),
-    *("table.csv", "table.md", "cost-time-*.png", "foresight.png", "map.csv", "map.md", "map.png"),
+    *("table.csv", "table.md", "cost-time-*.png", "map.csv", "map.md", "map.png"),
     *(f"export/*/*{kind.suffix}" for kind in FORMATS.values()),
 )
 

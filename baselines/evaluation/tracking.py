@@ -23,50 +23,40 @@ from baselines.files import write
 from baselines.status import Status
 from ikgym import scenarios
 from ikgym.scenarios import Preview, Scenario
-from ikgym.validation import FloatArray, read_only, whole_number
+from ikgym.validation import FloatArray, whole_number
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Tracking:
-    """The record of an episode; row k belongs to the step that ended at ``times[k]``. All arrays are read-only.
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Tracking(Episode):
+    """The record of an episode, see :class:`baselines.episodes.Episode`, and its files; all arrays are read-only.
 
     Args:
-        scenario: The name of the scenario.
         policy: The name of the policy, as rows of an evaluation have it.
         parameters: The parameters of the policy, as far as they are known.
-        seed: The reset seed.
-        times: Ends of the steps, in [s]. Shape (steps,).
-        q: Joint coordinates, in [rad] or [m]. Shape (steps, n).
-        qdot: Joint velocities applied, in [rad/s] or [m/s]. Shape (steps, n).
-        pose: Task coordinates. Shape (steps, m).
-        nominal: Task coordinates of the reference trajectory. Shape (steps, m).
-        position_error: Distance from the nominal position in [m]. Shape (steps,).
-        orientation_error: Geodesic angle in [rad], NaN where the task has no orientation. Shape (steps,).
-        tracking_cost: Φ^X, 0 where the step does not count. Shape (steps,).
-        velocity_cost: Φ^U, 0 where the step does not count. Shape (steps,).
-        statuses: Values of :class:`baselines.Status`. Shape (steps,).
     """
 
-    scenario: str
     policy: str
     parameters: dict[str, Any]
-    seed: int
-    times: FloatArray
-    q: FloatArray
-    qdot: FloatArray
-    pose: FloatArray
-    nominal: FloatArray
-    position_error: FloatArray
-    orientation_error: FloatArray
-    tracking_cost: FloatArray
-    velocity_cost: FloatArray
-    statuses: npt.NDArray[np.int64]
-    _episode: Episode = dataclasses.field(repr=False)
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
 
     @property
-    def cost(self) -> FloatArray:
-        """−reward, step by step: Φ^X, Φ^U and, where the scenario has it, Φ^C. Shape (steps,)."""
-        return self._episode.cost
+    def seed(self) -> int:
+        """The reset seed."""
+        return self.seeds.seed
+
+    @property
+    def times(self) -> FloatArray:
+        """Ends of the steps, in [s]. Shape (steps,)."""
+        return self.scenario.times(len(self.q) + 1)[1:]
+
+    @property
+    def nominal(self) -> FloatArray:
+        """Task coordinates of the reference trajectory. Shape (steps, m)."""
+        return self.scenario.nominal(self.seed)[1:]
 
     @property
     def total_cost(self) -> float:
@@ -76,16 +66,16 @@ class Tracking:
     @property
     def motion(self) -> Motion:
         """The joint motion from the start on."""
-        return Motion.of(self._episode)
+        return Motion.of(self)
 
     @property
     def solver_status(self) -> Status:
         """The worst status that the solver reported."""
-        return Status(int(self.statuses.max()))
+        return Status(int(self.status.max()))
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """All numbers by name and unit, one number a step, as :meth:`to_csv` writes them."""
-        arm = self._episode.scenario.arm
+        arm = self.scenario.arm
         out: dict[str, npt.NDArray[Any]] = {"time [s]": self.times}
         out |= {**by_joint(arm, self.q), **by_joint(arm, self.qdot, "/s")}
         for name, values in (("pose", self.pose), ("nominal", self.nominal)):
@@ -96,9 +86,9 @@ class Tracking:
         out["orientation_error [rad]"] = self.orientation_error
         out["tracking_cost [1]"] = self.tracking_cost
         out["velocity_cost [1]"] = self.velocity_cost
-        if (near := self._episode.proximity_cost) is not None:
+        if (near := self.proximity_cost) is not None:
             out["proximity_cost [1]"] = near
-        out["solver_status"] = np.array([Status(status).label for status in self.statuses.tolist()])
+        out["solver_status"] = np.array([Status(status).label for status in self.status.tolist()])
         return out
 
     def to_csv(self, file: str | os.PathLike[str]) -> None:
@@ -116,15 +106,15 @@ class Tracking:
             InvalidInputError: The episode ends in motion, and has no room to stop.
             ResultsError: The file cannot be written.
         """
-        write(pathlib.Path(file), joint_trajectory(self._episode, accelerations))
+        write(pathlib.Path(file), joint_trajectory(self, accelerations))
 
     def to_mcap(self, file: str | os.PathLike[str], *, accelerations: bool = False) -> None:
         """Likewise as an MCAP file, by rosbags; see :meth:`to_joint_trajectory`."""
-        write(pathlib.Path(file), mcap(self._episode, accelerations))
+        write(pathlib.Path(file), mcap(self, accelerations))
 
     def plot(self) -> Figure:
         """Task coordinates with those of the reference, and errors, over time, at the steps that count."""
-        return picture.draw(f"{self.scenario}: {self.policy}", trajectory_log(self._episode))
+        return picture.draw(f"{self.scenario.name}: {self.policy}", trajectory_log(self))
 
 
 def track(
@@ -159,10 +149,4 @@ def track(
     job = job_of(policy, found, whole_number("seed", seed, at_least=0), preview, wrap)
     ((row, episode),) = play((job,))
     assert episode is not None  # since the job asks for it
-    names = ("q", "qdot", "pose", "position_error", "orientation_error", "tracking_cost", "velocity_cost")
-    arrays: dict[str, Any] = {name: getattr(episode, name) for name in names}
-    arrays["times"] = found.dt * np.arange(1, len(episode.q) + 1)
-    arrays["nominal"] = episode.scenario.nominal(seed)[1:]
-    arrays["statuses"] = episode.status
-    kept: dict[str, Any] = {name: read_only(np.array(values)) for name, values in arrays.items()}
-    return Tracking(row.scenario, row.policy, row.parameters, seed, **kept, _episode=episode)
+    return Tracking(**vars(episode), policy=row.policy, parameters=row.parameters)

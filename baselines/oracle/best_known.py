@@ -13,7 +13,7 @@ import json
 import math
 import pathlib
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from baselines.files import ResultsError, from_json, locked, read_json, reading, write
 from baselines.fingerprints import episode_hash, fingerprint
@@ -65,19 +65,6 @@ class _Records(NamedTuple):
     by_hash: Mapping[str, Record]
 
 
-class Scored(Protocol):
-    """The identity and cost of an episode: a :class:`baselines.evaluation.metrics.Row`."""
-
-    @property
-    def scenario(self) -> str: ...  # noqa: D102
-    @property
-    def seed(self) -> int: ...  # noqa: D102
-    @property
-    def fingerprint(self) -> str: ...  # noqa: D102
-    @property
-    def total_cost(self) -> float: ...  # noqa: D102
-
-
 def lookup(scenario: Scenario, seed: int, arm_seed: int | None = None) -> Record | None:
     """The record of an episode; None where there is none, or it is of another content than the episode now has.
 
@@ -99,8 +86,8 @@ def costs(scenario: Scenario, seeds: Iterable[int]) -> list[float | None]:
     return [_usable_cost(_lookup(content, seed)) for seed in seeds]
 
 
-def beaten_record(row: Scored) -> Record | None:
-    """The record that a row's cost lies below, by more than rounding; None where it does not."""
+def beaten_record(row: Any) -> Record | None:
+    """The record that the cost of an evaluation's row lies below, by more than rounding; None where it does not."""
     known = _lookup(row.fingerprint, row.seed)
     if known is None or known.cost <= MEANINGLESS or not row.total_cost < known.cost * (1.0 - MARGIN):
         return None

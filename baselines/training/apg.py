@@ -12,11 +12,11 @@ import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 
-from baselines.agents.files import AgentFile, agent_of, load_agent
+from baselines.agents.files import AgentFile, agent_of
 from baselines.training.exporting import ACTIVATIONS, runtime
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.options import APG, TrainingError
+from baselines.training.options import APG
 from ikgym.scenarios import Scenario
 
 #: Factor of the first weights of the last layer.
@@ -42,15 +42,12 @@ class Trainer:
 
     Raises:
         InvalidInputError: The scenario's plant is not ideal.
-        TrainingError: The agent of `init` has another structure.
     """
 
     def __init__(self, config: APG, scenario: Scenario, seed: int) -> None:
         self._law = Law(scenario, config.processing)
         torch.manual_seed(_sequence(seed, 0).generate_state(3).tolist()[2])
         policy = new_actor((self._law.inputs, *config.hidden, self._law.outputs), config.activation)
-        if config.init is not None:
-            _load_weights(policy, config)
         self._config, self._scenario, self._seed = config, scenario, seed
         self.policy, self._actor, self.steps = policy, copy.deepcopy(policy), 0
         self._adam = torch.optim.Adam(self._actor.parameters(), lr=config.learning_rate)
@@ -178,25 +175,6 @@ def _clip_gradients(tensor: Tensor, most: float) -> Tensor:
     if out.requires_grad:
         out.register_hook(cut)  # type: ignore[no-untyped-call]
     return out
-
-
-def _load_weights(policy: nn.Sequential, config: APG) -> None:
-    """Loads the weights of the agent in `init`.
-
-    Raises:
-        ResultsError: The file cannot be read.
-        TrainingError: The agent has another structure.
-    """
-    assert config.init is not None
-    agent = load_agent(config.init)
-    expected = config.processing, runtime(list(policy), "linear").to_json()
-    found = agent.processing, agent.network.to_json()
-    if found != expected:
-        words = "an agent with {} and a network {}"
-        raise TrainingError(f"{config.init}: expected {words.format(*expected)}, got {words.format(*found)}.")
-    with torch.no_grad():
-        for parameter, tensor in zip(policy.parameters(), agent.network.tensors.values(), strict=True):
-            parameter.copy_(torch.from_numpy(tensor.copy()))
 
 
 def new_actor(sizes: Sequence[int], activation: str) -> nn.Sequential:

@@ -122,15 +122,10 @@ class APG(Frozen):
     """Displacement in the segments of the last window, in which the agent learns to come back from farther away."""
     averaging: Annotated[float, tyro.conf.arg(metavar="β"), Bounds(at_least=0.0, at_most=1.0)] = 0.99
     """Factor of the exponential moving average of the weights, which is the agent."""
-    init: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The agent.safetensors of an earlier run with the first weights; offsets, damping, hidden and activation must be
-    those of that run."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._settle(offsets=self.processing.offsets, damping=self.processing.damping)
-        if self.init is not None:
-            self._settle(init=pathlib.Path(self.init))
         for steps in self.window:
             if steps % self.hold or self.segment_steps % steps:
                 raise InvalidInputError(

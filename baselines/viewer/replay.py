@@ -101,5 +101,5 @@ def play_all(stage: Stage, policies: Sequence[str]) -> list[Replay]:
         steps = np.maximum(np.arange(stage.scenario.steps + 1) - 1, 0)
         errors = made.position_error[steps], made.orientation_error[steps]
         cost = np.append(0.0, np.cumsum(made.cost))
-        replays.append(Replay(policy, made.motion.q, *errors, cost, made.statuses[steps]))
+        replays.append(Replay(policy, made.motion.q, *errors, cost, made.status[steps]))
     return replays

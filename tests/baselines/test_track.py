@@ -21,7 +21,7 @@ STEPS = 30
 def test_it_is_the_episode_of_the_evaluation_and_of_gymnasium():
     track = baselines.track("varga7-random", "rhc_gradient:horizon=3", seed=2_000_000, steps=STEPS)
     (row,) = evaluate("varga7-random", "rhc_gradient", steps=STEPS)
-    assert (track.scenario, track.policy, track.seed) == ("varga7-random", "rhc_gradient", 2_000_000)
+    assert (track.scenario.name, track.policy, track.seed) == ("varga7-random", "rhc_gradient", 2_000_000)
     assert track.parameters == row.parameters
     assert (track.total_cost, track.solver_status.label) == (row.total_cost, row.solver_status)
     assert track.position_error.max() == row.position_error_max
@@ -46,10 +46,10 @@ def test_shapes_and_arrays_that_stay_as_they_are():
     track = baselines.track("zhang3-helix", "dls", steps=STEPS)
     for name, columns in {"q": 3, "qdot": 3, "pose": 3, "nominal": 3}.items():
         assert getattr(track, name).shape == (STEPS, columns)
-    for name in ("times", "position_error", "tracking_cost", "velocity_cost", "statuses"):
+    for name in ("times", "position_error", "tracking_cost", "velocity_cost", "status"):
         assert getattr(track, name).shape == (STEPS,)
     assert np.isnan(track.orientation_error).all()
-    assert track.solver_status is Status(track.statuses.max())
+    assert track.solver_status is Status(track.status.max())
     with pytest.raises(ValueError, match="read-only"):
         track.q[0] = 1.0
     with pytest.raises(AttributeError):
@@ -79,7 +79,7 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
     ]
     np.testing.assert_array_equal([float(row["joint_1 [rad]"]) for row in rows], track.q[:, 0])
     np.testing.assert_array_equal([float(row[f"nominal{size} [m]"]) for row in rows], track.nominal[:, -1])
-    assert rows[0]["solver_status"] == Status(int(track.statuses[0])).label
+    assert rows[0]["solver_status"] == Status(int(track.status[0])).label
     empty = {row["orientation_error [rad]"] == "" for row in rows}
     assert empty == {not ikgym.scenarios.get(scenario).task.has_orientation}
     with pytest.raises(ResultsError, match="Cannot write"):

@@ -104,8 +104,8 @@ Files in the folder of --out, each replaced in one go, so that a run may be stop
   report.html   a table that sorts and filters, plots, and replays of the arms: open it in a browser
   series/       the data of the plots, as .npz
   export/       with --export, the joint motion of each episode
-  table.csv, table.md, cost-time-SCENARIO.png, foresight.png   with --leaderboard
-  map.csv, map.md, map.png                                     with --severities
+  table.csv, table.md, cost-time-SCENARIO.png   with --leaderboard
+  map.csv, map.md, map.png                       with --severities
 
 Columns:
 {_columns()}

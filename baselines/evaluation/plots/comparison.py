@@ -1,4 +1,4 @@
-"""Plots of a table of results: cost against time, cost against foresight, and cost over two severities."""
+"""Plots of a table of results: cost against time, and cost over two severities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.ticker import FixedLocator, FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from baselines.evaluation.plots import style
 from baselines.evaluation.table import number
@@ -54,25 +54,6 @@ def cost_time(lines: Lines, title: str) -> Figure:
     style.dress(axes, xlabel="time of a call, 99th percentile [µs]", ylabel=EXCESS)
     title = style.literal(f"{title}: cost against time, and the Pareto front")
     style.legend(drawn, title, points, [style.literal(str(policy)) for policy in named.policy])
-    return drawn
-
-
-def foresight(lines: Lines, title: str, by: str) -> Figure:
-    """Excess cost against foresight, with intervals: a panel per scenario, a series per value of the column `by`."""
-    drawn, table = style.figure(3.4), _frame(lines)
-    scenarios, series = table.scenario.unique(), table[by].unique()
-    panels = drawn.subplots(1, len(scenarios), squeeze=False)[0]
-    for axes, scenario in zip(panels, scenarios, strict=True):
-        here, handles = table[table.scenario == scenario].sort_values("foresight", kind="stable"), []
-        for place, value in enumerate(series):
-            some = here[here[by] == value]
-            handles += axes.plot(some.foresight, some.excess, lw=1.4, **style.looks(place))
-            for line in some.itertuples():
-                _interval(axes, line.foresight, line, marker="o", ms=4.5, color=style.looks(place)["color"])
-        _set_logarithmic(axes)
-        axes.xaxis.set_major_locator(FixedLocator(sorted(here.foresight.unique())))
-        style.dress(axes, xlabel="foresight [steps]", ylabel=EXCESS, title=style.literal(str(scenario)))
-    style.legend(drawn, title, handles, [style.literal(f"{by.replace('_', ' ')}: {value}") for value in series])
     return drawn
 
 

@@ -160,8 +160,6 @@ def test_plots_show_every_line():
     assert min(len(shown(axis)) for axis in (close.xaxis, close.yaxis)) >= 2
     exact = [line(name, 1.0 + 1e-6 * k, 25.0 + k, low=None, high=None) for name, k in (("a", 0), ("b", 185))]
     assert len(shown(comparison.cost_time(exact, "title").axes[0].yaxis)) >= 3
-    drawn = comparison.foresight(lines, "title", "policy")
-    assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["policy: a", "policy: b"]
     cells = [line("a", 2.0, None, knowledge=k, drives=d) for k in (0, 1) for d in (0, 1)]
     texts = [text.get_text() for text in comparison.severity_map(cells).axes[0].texts]
     assert texts == ["2.000"] * 4

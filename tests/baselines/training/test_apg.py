@@ -5,10 +5,8 @@ import pytest
 import torch
 
 from baselines.agents.bilinear.processing import Bilinear
-from baselines.agents.files import load_agent, save_agent
 from baselines.training.gradients.arms import Arms
 from baselines.training.gradients.law import Law
-from baselines.training.options import TrainingError
 from baselines.training.run import policy_of, validate
 from ikgym import Plant, scenarios
 from ikgym.exceptions import InvalidInputError
@@ -91,19 +89,6 @@ def test_it_learns():
     losses = [metrics["train/loss"] for metrics in map(trainer.segment, range(4))]
     assert validate(policy_of(trainer.agent(), scenario), scenario, 8)["cost"] < 2e-2 * before
     assert losses[-1] < losses[0]
-
-
-def test_runs_begin_from_an_agent(tmp_path):
-    trained = trainer_of(CONFIG)
-    trained.segment(0)
-    save_agent(tmp_path / "a.safetensors", trained.agent())
-    begun = trainer_of(CONFIG.replace(init=tmp_path / "a.safetensors"), seed=5)
-    wanted = load_agent(tmp_path / "a.safetensors").network
-    for layer, weights in zip(begun.policy[::2], wanted.weights, strict=True):
-        np.testing.assert_array_equal(layer.weight.detach(), weights)
-    for other in ({"hidden": (3,)}, {"offsets": (1, 5)}, {"damping": 1e-3}):
-        with pytest.raises(TrainingError, match=r"a\.safetensors: expected an agent with"):
-            trainer_of(CONFIG.replace(init=tmp_path / "a.safetensors", **other))
 
 
 def test_lost_arms_are_put_back_on_their_path():

@@ -50,7 +50,6 @@ def test_several_seeds(alone, tmp_path, capsys):
         (["apg", "--preset", "quck"], "There is no preset 'quck'. Did you mean 'quick'?"),
         (["apg", "--window", "1000000000"], "window: expected a whole number from 1 to 10000, got 1000000000."),
         (["apg", "--window", "7"], "window: expected multiples of hold"),
-        (["apg", *TINY, "--init", "nowhere.safetensors"], "Cannot read nowhere.safetensors"),
         (["apg", *TINY[2:], "--scenario", "panda-field"], "expected an ideal plant with a known gradient"),
     ],
 )
