@@ -18,7 +18,7 @@ from baselines.evaluation.summary import rank
 from baselines.evaluation.table import markdown, to_csv
 from baselines.files import write
 from baselines.oracle import Search
-from baselines.oracle.several import Wanted, find_all
+from baselines.oracle.several import SearchJob, find_all
 
 #: Columns of all tables, and of those with free timing or collisions.
 COLUMNS: tuple[str, ...] = (
@@ -58,7 +58,7 @@ def write_map(out: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], polic
     """Writes map.csv, map.md and map.png; best known costs that are not recorded are searched and cached."""
     jobs_by_key = {job.key: job for job in jobs}
     missing = {(row.scenario, row.seed): jobs_by_key[row.key] for row in rows if row.cost_ratio is None}
-    wanted = [Wanted(job.scenario, job.seeds._replace(noise_seed=0), HOW) for job in missing.values()]
+    wanted = [SearchJob(job.scenario, job.seeds._replace(noise_seed=0), HOW) for job in missing.values()]
     found = {
         (one.scenario.name, one.draw.seed): optimum.cost
         for one, optimum in tqdm(find_all(wanted), total=len(wanted), unit="best known cost")

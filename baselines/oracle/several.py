@@ -22,7 +22,7 @@ from ikgym.scenarios import Scenario
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Wanted:
+class SearchJob:
     """An episode whose best known cost is wanted.
 
     Args:
@@ -40,7 +40,7 @@ class Wanted:
     cached: bool = True
 
 
-def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> Optimum:
+def find(wanted: SearchJob, tick: Callable[[float], None] = lambda share: None) -> Optimum:
     """The cheapest path that is found, in this process; ``tick`` as of :func:`baselines.oracle.solve`.
 
     Raises:
@@ -54,8 +54,10 @@ def find(wanted: Wanted, tick: Callable[[float], None] = lambda share: None) -> 
 
 
 def find_all(
-    wanted: Sequence[Wanted], workers: Workers = ALONE, tick: Callable[[Wanted, float], None] = lambda one, share: None
-) -> Iterator[tuple[Wanted, Optimum]]:
+    wanted: Sequence[SearchJob],
+    workers: Workers = ALONE,
+    tick: Callable[[SearchJob, float], None] = lambda one, share: None,
+) -> Iterator[tuple[SearchJob, Optimum]]:
     """The cheapest paths that are found; by workers in the order in which they are done.
 
     Paths found by workers of a cluster are played again here, and kept on the disk of this machine as well. ``tick`` is
@@ -92,7 +94,7 @@ def find_all(
             yield one, optimum
 
 
-def check_policies(wanted: Sequence[Wanted]) -> None:
+def check_policies(wanted: Sequence[SearchJob]) -> None:
     """Checks policies on one episode of each scenario, before anything is played.
 
     Raises:
@@ -109,7 +111,7 @@ def _make_policy(scenario: Scenario, spec: str) -> SolverPolicy:
     return registry.make(name, scenario, **parameters)
 
 
-def _check(one: Wanted, optimum: Optimum) -> None:
+def _check(one: SearchJob, optimum: Optimum) -> None:
     """Checks that this machine computes the same cost of a path."""
     episode = EpisodeProblem.of(strip_plant(one.scenario, one.draw.seed, one.draw.arm_seed), one.draw.seed)
     _, cost = episode.play(optimum.qdot)

@@ -17,7 +17,7 @@ from baselines.evaluation import test_sets as known_sets
 from baselines.oracle import best_known
 from baselines.oracle.cache import VARIABLE
 from baselines.oracle.optimum import Optimum, Search
-from baselines.oracle.several import Wanted, check_policies, find_all
+from baselines.oracle.several import SearchJob, check_policies, find_all
 from baselines.oracle.stripped import NOTE, strips
 from baselines.workers import ALONE, Workers
 from ikgym import scenarios as scenario_registry
@@ -125,7 +125,7 @@ def optima(
     todo: Sequence[SeededScenario], how: Search, policies: Sequence[str] = (), *, cache: bool, workers: Workers = ALONE
 ) -> Iterator[tuple[Scenario, Optimum]]:
     """Searches episodes, with a bar on stderr, and yields each as soon as it is done."""
-    wanted = [Wanted(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
+    wanted = [SearchJob(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
     check_policies(wanted)
     with tqdm(
         total=len(todo),
@@ -137,7 +137,7 @@ def optima(
     ) as bar:
         done = 0
 
-        def tick(one: Wanted, share: float) -> None:
+        def tick(one: SearchJob, share: float) -> None:
             bar.set_description(f"{one.scenario.name}, seed {one.draw.seed} ({done + 1}/{len(todo)})", refresh=False)
             bar.update(share)
 

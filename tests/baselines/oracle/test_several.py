@@ -7,7 +7,7 @@ import pytest
 from baselines.episodes import Seeds
 from baselines.oracle import Search, several
 from baselines.oracle.cache import read_cached
-from baselines.oracle.several import Wanted, find_all
+from baselines.oracle.several import SearchJob, find_all
 from baselines.workers import WorkerError, Workers
 from ikgym import scenarios
 from tests.baselines.losing import LosingCluster
@@ -23,7 +23,7 @@ def pool(monkeypatch):
 
 def wanted(*, cached=True):
     scenario = scenarios.get("varga7-random").replace(steps=40)
-    return [Wanted(scenario, Seeds(seed), HOW, cached=cached) for seed in (7_000_000, 7_000_001)]
+    return [SearchJob(scenario, Seeds(seed), HOW, cached=cached) for seed in (7_000_000, 7_000_001)]
 
 
 def costs(found):
