@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import tyro
 
 from baselines.cli.parsing import Rule
+from baselines.paths.survey import RESERVE
 from ikgym import arms, scenarios, tasks
 from ikgym.arms import Arm
 from ikgym.arms.urdf import open_meshes
@@ -92,6 +93,8 @@ class OwnPath(RobotOptions):
     orientations."""
     dt: Annotated[float | None, tyro.conf.arg(metavar="T")] = None
     """Control period in [s]: 0.004 by default, or that of the scenario."""
+    reserve: Annotated[float, tyro.conf.arg(metavar="SHARE"), Bounds(at_least=0.0, at_most=0.9)] = RESERVE
+    """Share of the limits of velocity and acceleration that a retimed motion leaves to the feedback of a real arm."""
 
 
 _WITH_CSV = (*ROBOT_OPTIONS[:5], "--speed", "--tool-acceleration", "--corner-radius", "--task")

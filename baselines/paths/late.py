@@ -14,8 +14,10 @@ from ikgym.plant import Plant
 from ikgym.scenarios import Scenario
 from ikgym.simulator import Simulator
 
-#: Drives with a lag of first order, its time constant in [s], and a delay in steps.
+#: Drives with a lag of first order, its time constant in [s], and a delay in steps, where a plant states no drives.
 LAG, DELAY = 0.02, 2
+#: The fields of a plant that state its drives.
+DRIVES = ("bandwidth", "command_delay", "drive")
 
 
 class Loop(NamedTuple):
@@ -32,8 +34,22 @@ class Loop(NamedTuple):
     time: float
 
 
+def states_drives(plant: Plant) -> bool:
+    """Whether the drives of a plant lag or are late."""
+    return plant.longest_command_delay > 0 or np.min(plant.bandwidth) < math.inf or bool(plant.drive)
+
+
+def describe_drives(plant: Plant) -> str:
+    """The drives of :func:`late`."""
+    if states_drives(plant):
+        return "the drives that the plant states"
+    return f"drives with a lag of {1e3 * LAG:g} ms and {DELAY} periods of delay"
+
+
 def late(plant: Plant) -> Plant:
-    """The plant with late drives."""
+    """The plant with late drives; as it is where it states drives."""
+    if states_drives(plant):
+        return plant
     return plant.replace(bandwidth=1.0 / (2.0 * math.pi * LAG), command_delay=DELAY)
 
 
@@ -41,10 +57,11 @@ def play_late(scenario: Scenario, solver: str) -> Loop:
     """Plays a path in the control loop on late drives, which the loop has to identify on the way.
 
     Args:
-        scenario: A scenario whose path is the same at every reset, with its start. Its plant is taken to be ideal.
+        scenario: A scenario whose path is the same at every reset, with its start. Of its plant the drives count.
         solver: The policy, as text.
     """
-    scenario = ideal(scenario, plant=late(Plant()))
+    drives = Plant(**{name: getattr(scenario.plant, name) for name in DRIVES})
+    scenario = ideal(scenario, plant=late(drives))
     controller = Controller(scenario, solver)
     simulator = Simulator(scenario, None, controller.ahead)
     simulator.reset(np.ones(1, dtype=np.bool_), [seeding.np_random(0)[0]])

@@ -30,4 +30,4 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _work(given: OwnPath, _: str) -> None:
-    print(compare(scenario_of(given), progress=True).table(shell.width()))
+    print(compare(scenario_of(given), reserve=given.reserve, progress=True).table(shell.width()))

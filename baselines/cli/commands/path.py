@@ -15,24 +15,21 @@ from baselines.cli.own_path import RULES, OwnPath, describe_bodies, look_at, sce
 from baselines.controller.guards import Guards
 from baselines.files import check_writable_file
 from baselines.paths import Branch, Retimed, Survey, survey
-from baselines.paths.late import DELAY, LAG, play_late
+from baselines.paths.late import describe_drives, play_late, states_drives
 from baselines.paths.motion import OTHERS, PREFERRED
 from baselines.paths.planning import PLAYER, Plan, plan
 from baselines.paths.retiming import find_retimed, refusal
 from baselines.paths.speeds import fastest, speed_limit
-from baselines.paths.survey import REACHED, Contact, follows
+from baselines.paths.survey import REACHED, Contact, describe_reserve, follows
 from ikgym import tasks
 from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
-from ikgym.validation import BoolArray, Bounds, FloatArray, known_names, whole_number
+from ikgym.validation import BoolArray, FloatArray, known_names, whole_number
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
-#: With a lag of 20 ms and 2 periods of 4 ms, the control loop follows 29 of 29 retimed paths, with 40 ms and 3 periods
-#: 20; without a reserve, with 20 ms and 2 periods, none of seven.
-RESERVE = 0.15
 #: A motion that uses more than this share of a limit is played on drives that lag, also where it is not retimed.
 HARD = 0.7
 
@@ -47,8 +44,6 @@ class Options(OwnPath):
     """Times the path as fast as the limits allow, not only as fast as asked."""
     branch: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Takes the start in this line of the table."""
-    reserve: Annotated[float, tyro.conf.arg(metavar="SHARE"), Bounds(at_least=0.0, at_most=0.9)] = RESERVE
-    """Share of the limits of velocity and acceleration that the motion leaves to the feedback of a real arm."""
     obstacles: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Obstacles of another scenario file, or of a file with nothing else, instead of those of the scenario."""
     bodies: Literal["on", "off"] | None = None
@@ -232,7 +227,8 @@ def _warnings(found: Survey, driven: Retimed) -> list[str]:
     if excess[joint] > 1.0:
         allowed = f"{Guards().acceleration(arm)[joint]:.3g} {_unit(arm, joint)}/s² at {arm.joint_names[joint]}"
         lines.append(f"Controller allows {allowed}, and may lose the path: state limits with --acceleration.")
-    if driven.duration != found.duration or driven.share > HARD:
+    stated = states_drives(driven.scenario.plant)
+    if stated or driven.duration != found.duration or driven.share > HARD:
         loop = play_late(driven.scenario, driven.solver)
         ends = f"follows within {_small(loop.error, 'm')}."
         if loop.stopped is not None:
@@ -240,7 +236,8 @@ def _warnings(found: Survey, driven: Retimed) -> list[str]:
                 f"stops after {loop.time:.3g} s ({loop.stopped.name}): begin with a slower motion, or keep more in "
                 "reserve (--reserve)."
             )
-        lines.append(f"On drives with a lag of {1e3 * LAG:g} ms and {DELAY} periods of delay, Controller {ends}")
+        others = "" if stated else " Slower drives were not tried."
+        lines.append(f"On {describe_drives(driven.scenario.plant)}, Controller {ends}{others}")
     return lines
 
 
@@ -263,8 +260,7 @@ def _when(found: Survey, driven: Retimed) -> str:
         return f"{can}, and {speed}"
     if driven.duration < found.duration:
         return f"It cannot be driven at the speeds that were asked for, but at others, {speed}"
-    kept = f", with {100 * found.reserve:.3g} % of the limits in reserve (--reserve)" if found.reserve else ""
-    return f"It cannot be driven in {found.duration:.3g} s, but {speed}{kept}"
+    return f"It cannot be driven in {found.duration:.3g} s, but {speed}{describe_reserve(found.reserve)}"
 
 
 def _free_about_z(found: Survey) -> list[str]:

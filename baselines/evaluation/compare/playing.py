@@ -20,7 +20,8 @@ from baselines.evaluation.summary import COLUMNS as EVERY
 from baselines.evaluation.summary import ERRORS, TIMES, summarise
 from baselines.evaluation.table import Column, plain
 from baselines.paths import retime
-from baselines.paths.late import DELAY, LAG, late
+from baselines.paths.late import describe_drives, late
+from baselines.paths.survey import RESERVE, describe_reserve
 from baselines.solvers.rivals.base import Rival
 from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import Scenario
@@ -42,6 +43,7 @@ class Comparison:
     rows: Sequence[Row]  # rows of all solvers, path by path
     recommendation: Recommendation  # the solver to take
     notes: Sequence[str]  # further remarks
+    drives: str  # the late drives
 
     def table(self, width: int = report.WIDTH) -> str:
         """Table, notes and recommendation as plain text; columns that decide nothing are left out if too wide."""
@@ -51,7 +53,7 @@ class Comparison:
         )
         table, _ = plain(COLUMNS, lines, width)
         texts = [
-            f"late drives: {1e3 * LAG:g} ms of lag, {DELAY} steps of delay; each solver as in baselines.Controller",
+            f"{LATE}: {self.drives}; each solver as in baselines.Controller",
             *[LIBRARY] * any(registry.get(row.policy).rival for row in self.rows),
         ]
         below = [textwrap.fill(text, width, subsequent_indent="  ") for text in (*texts, *self.notes, RULE)]
@@ -75,11 +77,12 @@ COLUMNS = (
 )
 
 
-def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
+def compare(scenario: Scenario, *, reserve: float = RESERVE, progress: bool = False) -> Comparison:
     """Plays solvers on a path, and recommends one by :func:`baselines.evaluation.compare.rule.recommend`.
 
     Args:
         scenario: A scenario whose path is the same at every reset.
+        reserve: As for :func:`baselines.paths.survey`, where the path is retimed.
         progress: Whether to show bars on stderr.
 
     Raises:
@@ -89,7 +92,7 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
         raise InvalidInputError(f"Expected a path that is the same at every reset, got scenario {scenario.name!r}.")
     stated = np.isfinite(scenario.arm.acceleration_limit).all()
     notes = [] if stated else [f"{report.STATED_NOTE}; --acceleration states limits"]
-    paths = [scenario.replace(name=AS_IT_IS), *_retime(scenario, notes)]
+    paths = [scenario.replace(name=AS_IT_IS), *_retime(scenario, reserve, notes)]
     played = evaluate(paths, PREFERRED, progress=progress)
     notes += [f"left out: {one.policy}: {one.reason}" for one in played.skipped if one.scenario == AS_IT_IS]
     rows = [*played]
@@ -100,17 +103,18 @@ def compare(scenario: Scenario, *, progress: bool = False) -> Comparison:
     driven = taken.replace(name=LATE, plant=late(scenario.plant))
     delayed = evaluate(driven, [(PREDICTED, {"policy": name, **SETTINGS}) for name in as_it_is], progress=progress)
     chosen = recommend(as_it_is, retimed, _by_solver(delayed, LATE), scenario.dt)
-    return Comparison(scenario.dt, [*rows, *delayed], chosen, notes)
+    return Comparison(scenario.dt, [*rows, *delayed], chosen, notes, describe_drives(scenario.plant))
 
 
-def _retime(scenario: Scenario, notes: list[str]) -> list[Scenario]:
+def _retime(scenario: Scenario, reserve: float, notes: list[str]) -> list[Scenario]:
     """The path in a time in which it can be driven, if there is one; a note says in which, or why there is none."""
     try:
-        found = retime(scenario)
+        found = retime(scenario, reserve=reserve)
     except (InvalidInputError, ModuleNotFoundError) as error:
         notes.append(f"not retimed: {error}")
         return []
-    notes.append(f"retimed: from the best start, in {found.duration:.4g} s where {found.asked:.4g} s were asked for")
+    asked = f"in {found.duration:.4g} s where {found.asked:.4g} s were asked for"
+    notes.append(f"retimed: from the best start, {asked}{describe_reserve(reserve)}")
     return [found.scenario.replace(name=RETIMED)]
 
 

@@ -81,10 +81,21 @@ def test_a_motion_near_its_limits_is_played_on_drives_that_lag(monkeypatch, caps
     assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
     assert "2 periods of delay" not in capsys.readouterr().out
     monkeypatch.setattr(path, "HARD", 0.0)
-    assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
+    assert main([*WELD, "--bodies", "off", "--speed", "0.2", "--retime", "weld.toml"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert "It can be driven as it is" in text
-    assert re.search(r"a lag of 20 ms and 2 periods of delay, Controller follows within [\d.]+ mm\.", text)
+    said = (
+        r"a lag of 20 ms and 2 periods of delay, Controller follows within ([\d.]+) mm\. Slower drives were not tried\."
+    )
+    usual = float(re.search(said, text)[1])
+    monkeypatch.setattr(path, "HARD", 1.0)
+    weld = ikgym.scenarios.load("weld.toml")
+    weld.replace(name="slow", plant=ikgym.Plant(bandwidth=4.0, command_delay=3)).save("slow.toml")
+    assert main(["path", "slow.toml"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    slow = re.search(r"On the drives that the plant states, Controller follows within ([\d.]+) mm\.$", text)
+    assert float(slow[1]) != usual
+    monkeypatch.setattr(path, "HARD", 0.0)
     monkeypatch.setattr(path, "play_late", lambda *_: Loop(0.03, StopReason.PATH_ERROR, 0.28))
     assert main([*WELD, "--bodies", "off", "--speed", "0.2"]) == 0
     text = " ".join(capsys.readouterr().out.split())

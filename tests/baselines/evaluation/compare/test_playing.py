@@ -8,6 +8,7 @@ import ikgym
 from baselines.evaluation import report
 from baselines.evaluation.compare import playing, rule
 from baselines.evaluation.compare.playing import compare
+from baselines.paths.survey import RESERVE
 from baselines.solvers.rivals.base import Rival
 
 
@@ -28,7 +29,8 @@ def test_a_path_out_of_reach_has_no_solver(monkeypatch):
 
 
 def test_what_is_left_out_is_named(monkeypatch):
-    def missing(scenario):
+    def missing(scenario, reserve):
+        assert reserve == RESERVE
         raise ModuleNotFoundError("No module named 'toppra'")
 
     monkeypatch.setattr(playing, "PREFERRED", ("qp", "pink"))
