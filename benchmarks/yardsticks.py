@@ -26,8 +26,8 @@ from baselines.files import write
 from baselines.policy import Batch, Memory, Solution, SolverPolicy, statuses
 from baselines.registry import parse_policy
 from ikgym import rl, scenarios
-from ikgym.rl.scoring import EPISODES, FILE
-from ikgym.rl.track import cost_rewards
+from ikgym.rl.scoring import EPISODES, FILE, play
+from ikgym.rl.track import episode_rewards
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import Bounds, FloatArray
 
@@ -140,9 +140,9 @@ def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
 
 def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:
     """Sums of the rewards of whole episodes, see :class:`ikgym.rl.Task`. Shape (episodes,)."""
-    return np.array(
-        [cost_rewards(one.cost[-(task.counted or 0) :], task.half, task.steepness).sum() for one in episodes]
-    )
+    rest = next(play(Still(), task, [one.seeds.seed for one in episodes]))  # an arm at rest is where it started
+    start = rest["tracking_cost"] + rest["velocity_cost"]
+    return np.array([episode_rewards(task, one.cost, at).sum() for one, at in zip(episodes, start, strict=True)])
 
 
 def threshold(name: str, solver: str, still: FloatArray, one: FloatArray) -> float:

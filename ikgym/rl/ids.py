@@ -74,14 +74,14 @@ class ReachEnv(TaskEnv):
     | other than in `ikgym/Track-v0` | |
     |---|---|
     | observation space | `Box(-5.0, 5.0, (26,), float32)`: indices 0 to 25, of the target; units 0.3 m, 0.3 rad |
-    | reward | 1 / (1 + √c / 10); 0 in the first 50 steps |
+    | reward | r = 1 / (1 + √(√c / 30)), 0 in the first 50 steps; in all of them also 50 times the change of r |
     | starting state | home, at rest |
     | episode end | truncated after 100 steps, never terminated |
     | score | of the last 50 steps |
     """
 
     task = Task(
-        scenario="learning-reach", ahead=(0.02,), lost_distance=None, half=0.01, steepness=1, coarse=0.3, counted=50
+        "learning-reach", (0.02,), None, half=0.03, steepness=0.5, coarse=0.3, counted=50, progress=50.0
     )
     metadata: ClassVar[dict[str, Any]] = {**TaskEnv.metadata, "render_fps": 50}  # type: ignore[misc]
 

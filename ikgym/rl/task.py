@@ -49,8 +49,10 @@ squares of the model, as shares of the largest |
 
         reward = 1 / (1 + (√c · 1 mm / h)^k)
 
-    h is `half`, k `steepness`. With Δx = 1 mm and P_X = 2, √c · 1 mm is a distance where 1 rad counts as 1 m. The
-    reward is 0 in steps that are not `counted`.
+    h is `half`, k `steepness`. With Δx = 1 mm and P_X = 2, √c · 1 mm is a distance where 1 rad counts as 1 m. This
+    reward is 0 in steps that are not `counted`. With `progress` K, each step is also rewarded by K times the change of
+    this quotient from the step before, at first from that of the errors shown. Such a shaping by potentials (Ng, Harada
+    and Russell 1999) is below 0 where an arm moves away; it adds up to the difference between start and end.
 
     Args:
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
@@ -61,10 +63,11 @@ squares of the model, as shares of the largest |
         share: Share of the largest joint velocities that an action of 1 means, above 0.
         radian: Weight of 1 rad in [m], in the observation, above 0.
         half: Distance with the reward 1/2 in [m], above 0.
-        steepness: k, 1 or 2; rewards with 1 span more decades of distances.
+        steepness: k, from 0.1 to 2; rewards with a small one span more decades of distances.
         coarse: Unit of errors in the observation, in [m], above 0.
         fine: Unit of the hyperbolic tangent of the same, in [m], above 0.
         counted: Steps at the end of an episode that are rewarded and scored; None for all.
+        progress: Factor of progress, from 0.
         inverse: Whether the observation has joint velocities of the model's damped inverse Jacobian.
         context: Whether the observation ends with the context of the episode, see :class:`ikgym.Plant`.
 
@@ -80,10 +83,11 @@ squares of the model, as shares of the largest |
     share: float = 0.8
     radian: float = 1.0
     half: float = 0.025
-    steepness: int = 2
+    steepness: float = 2.0
     coarse: float = 0.03
     fine: float = 0.01
     counted: int | None = None
+    progress: float = 0.0
     inverse: bool = False
     context: bool = False
 
@@ -91,7 +95,8 @@ squares of the model, as shares of the largest |
         whole_number("history", self.history, at_least=1, at_most=MOST_HISTORY)
         if self.counted is not None:
             whole_number("counted", self.counted, at_least=1)
-        whole_number("steepness", self.steepness, at_least=1, at_most=2)
+        number("steepness", self.steepness, at_least=0.1, at_most=2.0)
+        number("progress", self.progress, at_least=0.0, at_most=LARGEST)
         flag("inverse", self.inverse)
         flag("context", self.context)
         for name in ("share", "radian", "half", "coarse", "fine"):

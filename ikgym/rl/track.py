@@ -63,7 +63,9 @@ class Learner:
         self._fraction = task.share * self._fastest / scenario.velocity_limit
         self.action_space = spaces.Box(-1.0, 1.0, self._fraction.shape, np.float32)
         self._shape = self._fraction.shape if rows is None else (rows, scenario.joints)
-        self._slope, self._from = (task.half, task.steepness), scenario.steps - (task.counted or scenario.steps)
+        self._task, self._from = task, scenario.steps - (task.counted or scenario.steps)
+        self._first = slice(2 * scenario.joints, 2 * scenario.joints + twist_size(kind))  # features of the first error
+        self._before = np.zeros(rows or 1)
 
     def reset(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
         """The observations after a reset; where no episode has begun, they are those of the last step.
@@ -113,9 +115,13 @@ class Learner:
             cost: Their stage costs. Shape (N,).
             before: Steps that the episodes had before. Shape (N,) or ().
         """
-        return np.where(np.asarray(before) < self._from, 0.0, cost_rewards(cost, *self._slope))
+        near, earlier = cost_rewards(self._task, cost), self._before
+        self._before = near
+        return np.where(np.asarray(before) < self._from, 0.0, near) + self._task.progress * (near - earlier)
 
     def _shown(self, features: Features, begun: BoolArray) -> Features:
+        twist = features[begun, self._first].astype(np.float64) * (self._task.coarse / UNIT)
+        self._before[begun] = cost_rewards(self._task, (twist * twist).sum(axis=1))
         self._history[begun] = features[begun, None]
         return self._history.reshape(len(self._history), -1).copy()
 
@@ -147,9 +153,19 @@ class Learner:
         return scaled
 
 
-def cost_rewards(cost: FloatArray, half: float, steepness: int) -> FloatArray:
+def cost_rewards(task: Task, cost: FloatArray) -> FloatArray:
     """Rewards 1 / (1 + (√c · 1 mm / h)^k) of stage costs c, see :class:`ikgym.rl.Task`. Shapes (...)."""
-    rewards: FloatArray = 1.0 / (1.0 + (np.sqrt(cost) * (UNIT / half)) ** steepness)
+    rewards: FloatArray = 1.0 / (1.0 + (np.sqrt(cost) * (UNIT / task.half)) ** task.steepness)
+    return rewards
+
+
+def episode_rewards(task: Task, cost: FloatArray, start: float | FloatArray = np.inf) -> FloatArray:
+    """Rewards of whole episodes with the stage costs of all steps; `start` is the cost at the start. Shapes (steps, …)."""
+    near = cost_rewards(task, cost)
+    before = np.broadcast_to(cost_rewards(task, np.asarray(start)), near[:1].shape)
+    rewards: FloatArray = task.progress * np.diff(near, axis=0, prepend=before)
+    counted = slice(-(task.counted or 0), None)
+    rewards[counted] += near[counted]
     return rewards
 
 

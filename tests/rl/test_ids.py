@@ -114,14 +114,15 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
 def test_rewards_are_what_the_class_says(name):
     env = gym.make(name, lost_distance=None)
     task, steps = env.unwrapped.task, env.spec.max_episode_steps
-    stated = f"/ {1000 * task.half:g}" + "²" * (task.steepness == 2)
-    assert stated in type(env.unwrapped).__doc__
+    distance = {0.5: "√(√c / {:g})", 1: "√c / {:g}", 2: "c / {:g}²"}[task.steepness].format(1000 * task.half)
+    assert f"1 / (1 + {distance})" in type(env.unwrapped).__doc__
     env.reset(seed=0)
-    for step, action in enumerate(actions_of(env, steps)):
-        _, reward, _, _, info = env.step(action)
-        distance = np.sqrt(info["tracking_cost"] + info["velocity_cost"]) / (1000.0 * task.half)
-        counts = step >= steps - (task.counted or steps)
-        assert reward == pytest.approx(counts / (1.0 + distance**task.steepness), rel=1e-12)
+    out = [env.step(action) for action in actions_of(env, steps)]
+    cost = np.array([info["tracking_cost"] + info["velocity_cost"] for *_, info in out])
+    near = 1.0 / (1.0 + (np.sqrt(cost) / (1000.0 * task.half)) ** task.steepness)
+    expected = task.progress * np.diff(near, prepend=near[0])
+    expected[-(task.counted or 0) :] += near[-(task.counted or 0) :]
+    assert [reward for _, reward, *_ in out][1:] == pytest.approx(expected[1:], rel=1e-9, abs=1e-12)
 
 
 @every_id

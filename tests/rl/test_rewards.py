@@ -13,7 +13,7 @@ from baselines.episodes import Simulation
 from baselines.registry import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import yardsticks
-from ikgym.rl.track import cost_rewards
+from ikgym.rl.track import episode_rewards
 
 #: The better one of tuned `dls` and `qp`.
 SOLVERS = {"Fast": "dls:gain=0.06", "Limits": "qp:gain=1.0", "Camera": "dls:gain=0.03", "Payload": "dls:gain=0.55"}
@@ -60,22 +60,19 @@ def changed(action, kind, size, step, q, distance, rng):
 def play(name, policy, change=None, split="validation", episodes=16):
     """Mean return and score of a policy whose actions are changed."""
     task, (costs, present) = rl.IDS[name].task, record(name, policy, change, split, episodes)
-    found, returns = (
-        yardsticks(name, split, episodes),
-        (cost_rewards(costs, task.half, task.steepness) * present).sum(axis=0).mean(),
-    )
-    return returns, (found["still"] - np.log1p(costs.sum(axis=0)).mean()) / (found["still"] - found["solver"])
+    found, returns = yardsticks(name, split, episodes), (episode_rewards(task, costs) * present).sum(axis=0).mean()
+    log_cost = np.log1p(costs[-(task.counted or 0) :].sum(axis=0)).mean()
+    return returns, (found["still"] - log_cost) / (found["still"] - found["solver"])
 
 
 def record(name, policy, change, split, episodes):
-    """Costs of the steps that count, and whether the episode would have gone on until then. Shapes (steps, N)."""
+    """Costs of the steps, and whether the episode would have gone on until then. Shapes (steps, N)."""
     task, rng = rl.IDS[name].task, np.random.default_rng(0)
     scenario, seeds = scenarios.get(task.scenario), scenarios.seeds(split, episodes)
     kind, parameters = parse_policy(policy or "dls")
     solver = baselines.make(kind, scenario, **parameters)
     simulation, state = Simulation(scenario, seeds, preview=solver.preview, commands=solver.commands), None
     most = task.share * scenario.largest_qdot / scenario.velocity_limit
-    first = scenario.steps - (task.counted or scenario.steps)
     lost, distance, costs, present = np.zeros(episodes, np.bool_), np.zeros(episodes), [], []
     for step in range(scenario.steps):
         seen = simulation.seen
@@ -88,7 +85,7 @@ def record(name, policy, change, split, episodes):
         costs.append(out.cost.copy())
         present.append(~lost)
         lost = lost | (distance > (task.lost_distance or np.inf))
-    return np.array(costs[first:]), np.array(present[first:])
+    return np.array(costs), np.array(present)
 
 
 def policies(name):
@@ -122,7 +119,7 @@ def test_returns_rank_policies_as_scores_do(name, split):
 @pytest.mark.parametrize("trick", [("stop", 8), ("jitter", 0.1), ("early", 0.5), ("late", 0.1), ("hold", 0.8)], ids=str)
 def test_tricks_do_not_pay(name, trick):
     (honest, score), (cheat, other) = play(name, tuned(name)), play(name, tuned(name), trick)
-    assert cheat <= honest + 1e-9
+    assert cheat <= honest * (1.0 + 1e-6)
     assert cheat < honest or other > score - 1e-3  # an arm at a still target may rest
 
 
