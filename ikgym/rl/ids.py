@@ -153,10 +153,10 @@ class LimitsEnv(TaskEnv):
     |---|---|
     | action space | `Box(-1.0, 1.0, (7,), float32)`: shares of 1 rad/s |
     | observation space | `Box(-5.0, 5.0, (38,), float32)` |
-    | reward | 1 / (1 + √c / 100) |
+    | reward | r = 1 / (1 + √c / 50), and 30 times the change of r |
     """
 
-    task = Task(scenario="learning-limits", share=1.0, half=0.1, steepness=1)
+    task = Task(scenario="learning-limits", share=1.0, half=0.05, steepness=1.0, progress=30.0)
 
 
 class CameraEnv(TaskEnv):
