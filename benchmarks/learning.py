@@ -15,6 +15,7 @@ import hashlib
 import itertools
 import json
 import multiprocessing
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,6 +30,7 @@ from baselines.files import write
 from baselines.training.options import Rewards
 from baselines.training.rewards import train
 from baselines.training.zoo import ALGORITHMS, SETTINGS, read_entries, read_settings
+from benchmarks.regression import imitate
 from ikgym import rl
 from ikgym.rl.scoring import EPISODES
 
@@ -47,6 +49,7 @@ class Training(NamedTuple):
     config: Rewards
     seed: int
     folder: Path
+    imitates: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Command:
     """Of the trainings."""
     defaults: bool = False
     """The defaults of the library in place of the published settings."""
+    regression: bool = False
+    """Regression on the policy with score 1 in place of the algorithms, with the settings of SAC."""
     workers: int = 2
     """Processes that train at the same time."""
     runs: Path = Path("runs")
@@ -69,13 +74,14 @@ class Command:
     def trainings(self) -> list[Training]:
         """All of them, the first seeds first."""
         minutes, out = MINUTES if self.defaults else None, []
-        pairs = list(itertools.product(self.environments or rl.IDS, self.algorithms))
+        algorithms = ("sac",) if self.regression else self.algorithms
+        pairs = list(itertools.product(self.environments or rl.IDS, algorithms))
         if self.environments is None:
             pairs = [(env, name) for env, name in pairs if env in read_entries(SETTINGS / f"{name}.yml")]
         for seed, (env, algorithm) in itertools.product(self.seeds, pairs):
             config = Rewards(algorithm=algorithm, env=env, minutes=minutes, defaults=self.defaults)
             folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
-            out.append(Training(config, seed, folder))
+            out.append(Training(config, seed, folder, self.regression))
         return out
 
 
@@ -84,16 +90,28 @@ def about(training: Training) -> Line:
     config = training.config
     digest = hashlib.sha256(json.dumps(read_settings(config), sort_keys=True).encode()).hexdigest()[:8]
     kind = "defaults" if config.defaults else "published"
-    return dict(zip(RUN, (config.env, config.algorithm, kind, digest, str(training.seed)), strict=True))
+    algorithm = "regression" if training.imitates else config.algorithm
+    return dict(zip(RUN, (config.env, algorithm, kind, digest, str(training.seed)), strict=True))
 
 
 def curve(training: Training) -> list[Line]:
     """Trains, and gives the lines of the curve; the last one has the test."""
-    train(*training)
-    with (training.folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
-        lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in csv.DictReader(stream)]
-    model = ALGORITHMS[training.config.algorithm].load(training.folder / "model.zip", device="cpu")
-    cost = rl.costs(model, training.config.env, split="test", episodes=EPISODES)
+    config = training.config
+    if training.imitates:
+        settings, since = read_settings(config), time.process_time()
+        model: Any = imitate(config.env, settings, training.seed)
+        spent, score = (
+            time.process_time() - since,
+            rl.score({config.env: [rl.costs(model, config.env)]})[config.env].mean,
+        )
+        rows = [{"core_seconds": f"{spent:.1f}", "steps": str(settings["n_timesteps"]), "score": f"{score:.4f}"}]
+    else:
+        train(config, training.seed, training.folder)
+        with (training.folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        model = ALGORITHMS[config.algorithm].load(training.folder / "model.zip", device="cpu")
+    lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in rows]
+    cost = rl.costs(model, config.env, split="test", episodes=EPISODES)
     lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
     return lines
 
@@ -125,6 +143,8 @@ def picture(lines: Sequence[Line]) -> Figure:
         axes.remove()
     handles: Line = {}
     for (env, algorithm, kind), found in sorted(_groups(lines).items()):
+        if algorithm == "regression":  # has no curve
+            continue
         look = {**style.looks(list(ALGORITHMS).index(algorithm)), "lw": 0.8}
         label = algorithm if kind == "published" else f"{algorithm}, {kind}"
         for _, seed in itertools.groupby(found, lambda line: line["seed"]):

@@ -80,9 +80,7 @@ class ReachEnv(TaskEnv):
     | score | of the last 50 steps |
     """
 
-    task = Task(
-        "learning-reach", (0.02,), None, half=0.03, steepness=0.5, coarse=0.3, counted=50, progress=50.0
-    )
+    task = Task("learning-reach", (0.02,), None, half=0.03, steepness=0.5, coarse=0.3, counted=50, progress=50.0)
     metadata: ClassVar[dict[str, Any]] = {**TaskEnv.metadata, "render_fps": 50}  # type: ignore[misc]
 
 

@@ -160,7 +160,7 @@ def cost_rewards(task: Task, cost: FloatArray) -> FloatArray:
 
 
 def episode_rewards(task: Task, cost: FloatArray, start: float | FloatArray = np.inf) -> FloatArray:
-    """Rewards of whole episodes with the stage costs of all steps; `start` is the cost at the start. Shapes (steps, …)."""
+    """Rewards of whole episodes with the stage costs of all steps, `start` being that before. Shapes (steps, ...)."""
     near = cost_rewards(task, cost)
     before = np.broadcast_to(cost_rewards(task, np.asarray(start)), near[:1].shape)
     rewards: FloatArray = task.progress * np.diff(near, axis=0, prepend=before)
