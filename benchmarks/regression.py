@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from stable_baselines3 import SAC
 
 import baselines
 import ikgym.sb3
@@ -20,7 +19,7 @@ from ikgym.rl.scoring import FILE
 from ikgym.vector_env import RedundantIKVectorEnv
 
 
-def imitate(name: str, settings: dict[str, Any], seed: int) -> SAC:
+def imitate(name: str, settings: dict[str, Any], seed: int) -> Any:
     """An actor of SAC trained by regression: as many steps, updates and samples as SAC has with the same settings.
 
     In each step the network moves N arms, the solver says what it would do in their states, and a batch of all states
@@ -28,7 +27,7 @@ def imitate(name: str, settings: dict[str, Any], seed: int) -> SAC:
     """
     torch.set_num_threads(1)
     task, rows, rng = rl.IDS[name].task, settings["n_envs"], np.random.default_rng(seed)
-    model = rewards.make("sac", ikgym.sb3.make_vec(name, rows), settings, seed)
+    model: Any = rewards.make("sac", ikgym.sb3.make_vec(name, rows), settings, seed)
     envs = LearningVectorEnv(rows, task, autoreset_mode=AutoresetMode.SAME_STEP)
     kind, parameters = parse_policy(json.loads(FILE.read_text(encoding="utf-8"))["policies"][name])
     solver = baselines.make(kind, envs.scenario, **parameters)
@@ -51,7 +50,7 @@ def imitate(name: str, settings: dict[str, Any], seed: int) -> SAC:
         drawn = rng.integers(step + 1, size=model.batch_size), rng.integers(rows, size=model.batch_size)
         model.actor.optimizer.param_groups[0]["lr"] = model.lr_schedule(1.0 - step / steps)
         found = model.actor(torch.as_tensor(states[drawn]), deterministic=True)
-        loss = torch.nn.functional.mse_loss(found, torch.as_tensor(answers[drawn]))
+        loss: Any = torch.nn.functional.mse_loss(found, torch.as_tensor(answers[drawn]))
         model.actor.optimizer.zero_grad()
         loss.backward()
         model.actor.optimizer.step()

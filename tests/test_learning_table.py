@@ -16,7 +16,9 @@ PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
 def test_curves_are_of_the_published_settings(tmp_path):
     runs = {tuple(line[name] for name in learning.RUN) for line in PUBLISHED}
     for env, algorithm, _, _, seed in runs:
-        training = learning.Training(Rewards(algorithm=algorithm, env=env), int(seed), tmp_path)
+        imitates = algorithm == "regression"
+        config = Rewards(algorithm="sac" if imitates else algorithm, env=env)
+        training = learning.Training(config, int(seed), tmp_path, imitates)
         assert tuple(learning.about(training).values()) in runs
 
 
@@ -57,3 +59,15 @@ def test_another_training_replaces_its_lines(tmp_path, monkeypatch):
     assert read_settings(training.config)["n_envs"] == 64
     [panel] = learning.picture(lines).axes
     assert len(panel.lines) == 1
+
+
+def test_regression_learns_the_policy_with_score_1_within_seconds(tmp_path, monkeypatch):
+    monkeypatch.setattr(learning, "EPISODES", 4)
+    settings = {**read_settings(Rewards(algorithm="sac", env="ikgym/Track-v0")), "n_timesteps": 12_800}
+    monkeypatch.setattr(learning, "read_settings", lambda config: settings)
+    [training] = learning.Command(
+        environments=("ikgym/Track-v0",), seeds=(0,), regression=True, runs=tmp_path
+    ).trainings()
+    [line] = learning.curve(training)
+    assert line["algorithm"] == "regression"
+    assert float(line["score"]) > 0.4
