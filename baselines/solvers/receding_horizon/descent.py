@@ -14,26 +14,6 @@ _CONVERGED, _LIMIT, DIVERGED = int(Status.CONVERGED), int(Status.ITERATION_LIMIT
 GOES_ON = -1
 
 
-class DescentSettings(NamedTuple):
-    """The parameters of a descent.
-
-    Attributes:
-        tolerance: μ, the norm of the gradient at which the descent has converged.
-        steps: Most steps.
-        alpha_min: Smallest α.
-        alpha_max: Largest α.
-        alpha_factor: Factor by which α grows or shrinks.
-        difference: The finite difference δ of the joint velocities; 0 for the analytic gradient.
-    """
-
-    tolerance: float
-    steps: int
-    alpha_min: float
-    alpha_max: float
-    alpha_factor: float
-    difference: float
-
-
 class DescentMemory(NamedTuple):
     """Memory of the descents of B arms.
 
@@ -53,7 +33,7 @@ def stop_test(value, norm, settings, step):
         return DIVERGED
     if norm <= settings.tolerance:
         return _CONVERGED
-    return _LIMIT if step == settings.steps else GOES_ON
+    return _LIMIT if step == settings.iterations else GOES_ON
 
 
 @inner

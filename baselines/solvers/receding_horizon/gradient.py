@@ -10,12 +10,11 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from baselines.policy import Batch, Memory, Solution, SolverPolicy
-from baselines.policy.compiled import derived
+from baselines.policy.compiled import derived, kernel_fields, named_tuple
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
     DescentMemory,
-    DescentSettings,
     adapted,
     squares,
     stop_if_diverged,
@@ -86,7 +85,9 @@ class RecedingHorizonGradient(SolverPolicy):
     difference: Annotated[float, Bounds(at_least=SMALLEST_DIFFERENCE, at_most=1.0)] = 1e-3
     joint_weights: float | Sequence[float] = 1.0
     #: These in units of the smallest one. Shape (n,).
-    weights: FloatArray = derived()
+    weights: FloatArray = dataclasses.field(init=False, repr=False)
+    #: The finite difference; 0 for analytic gradients.
+    delta: float = derived()
 
     name: ClassVar[str] = "rhc_gradient"
     grain: ClassVar[int] = 1
@@ -98,7 +99,7 @@ class RecedingHorizonGradient(SolverPolicy):
                 f"alpha_max: expected at least alpha_min = {self.alpha_min:g}, got {self.alpha_max:g}."
             )
         weights = relative_weights("joint_weights", self.joint_weights, self.problem.model.joints)
-        self._settle(weights=weights)
+        self._settle(weights=weights, delta=self.difference if self.gradient == "finite_difference" else 0.0)
 
     @property
     def preview(self) -> int:
@@ -127,16 +128,10 @@ class RecedingHorizonGradient(SolverPolicy):
         return DescentMemory(plan, alpha)
 
     @functools.cached_property
-    def _constants(self) -> tuple[HorizonModel, DescentSettings]:
-        """The arguments of the kernel that never change."""
-        settings = DescentSettings(
-            tolerance=self.tolerance,
-            steps=self.iterations,
-            alpha_min=self.alpha_min,
-            alpha_max=self.alpha_max,
-            alpha_factor=self.alpha_factor,
-            difference=self.difference if self.gradient == "finite_difference" else 0.0,
-        )
+    def _constants(self) -> tuple[HorizonModel, Any]:
+        """The arguments of the kernel that never change: the model, and the fields with a number."""
+        names = kernel_fields(type(self))
+        settings = named_tuple(names)(*(getattr(self, name) for name in names))
         return HorizonModel(self.problem.kernel_model, self.weights), settings
 
     def _descend(self) -> Any:
@@ -154,14 +149,14 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
 
     Args:
         data: The :class:`horizon.HorizonModel`.
-        settings: :class:`DescentSettings`.
+        settings: The fields of :class:`RecedingHorizonGradient` with a number.
         q: Joint coordinates in [rad] or [m]. Shape (B, n).
         nominal: Nominal task coordinates ahead. Shape (B, at least HL - 1, m).
         memory: :class:`DescentMemory`, changed in place.
         status: Receives values of :class:`Status`. Shape (B,).
         iterations: Receives the steps made. Shape (B,).
     """
-    plan, alpha, difference = memory.plan, memory.alpha, settings.difference
+    plan, alpha, difference = memory.plan, memory.alpha, settings.delta
     gradient = np.empty(plan.shape[1:])
     for row in range(plan.shape[0]):
         qdot, step = plan[row], 0

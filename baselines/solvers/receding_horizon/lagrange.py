@@ -98,7 +98,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
 
     Other arguments are those of :func:`gradient.descend_rows`.
     """
-    alpha, difference, dt, (_, steps, n) = memory.alpha, settings.difference, data.model.dt, memory.plan.shape
+    alpha, difference, dt, (_, steps, n) = memory.alpha, settings.delta, data.model.dt, memory.plan.shape
     e = frame_workspace(data.model.kind, nominal[0])[3].shape[0] if with_tasks else 0
     errors, by_errors = np.empty((steps, e)), np.empty((steps, e))
     states, by_q, by_qdot = np.empty((steps, n)), np.empty((steps, n)), np.empty((steps, n))

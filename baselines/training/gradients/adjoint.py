@@ -69,11 +69,11 @@ class Kinematics(NamedTuple):
 
 
 @kernel
-def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
+def adjoint(model, rows, output, path, by_cost, gradient, start, stop):
     """Propagates gradients back through a segment.
 
     Args:
-        task: A :class:`baselines.training.gradients.segment.Task`.
+        model: As in the segment.
         rows: The input of the segment.
         output: As in the segment.
         path: The result of the segment.
@@ -82,12 +82,13 @@ def adjoint(task, rows, output, path, by_cost, gradient, start, stop):
         start: The first row.
         stop: The row after the last.
     """
-    chain, kind, e, dt, velocity_limit, limits, cost = task
+    chain, kind, cost, dt, velocity_limit, limits = model
     nominal, counted, steps, speed = rows
     q_path, qdot_path = path[:2]
     by_q, by_qdot, by_output = gradient
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
+    e = task_kernels.error_size(kind, m)
     size = 5 if kind == task_kernels.AXIS else w
     pose, task_jacobian, jacobian = np.empty(m), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
     place = Kinematics(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
@@ -179,7 +180,7 @@ def limits_gradient(limits, velocity_limit, j, command, move, by, dt):
     """Propagates the gradients of joint ``j`` back through the limits of :func:`ikgym.plant.step.step`.
 
     Args:
-        limits: Shape (4, n), or (0, n).
+        limits: See :class:`baselines.policy_kernels.Model`. Shape (6, n).
         velocity_limit: Shape (n,).
         j: The joint.
         command: The command in [rad/s] or [m/s].
@@ -193,8 +194,6 @@ def limits_gradient(limits, velocity_limit, j, command, move, by, dt):
     last, here, reached = move
     lambda_, mu = by
     by_last, passes = 0.0, abs(command) <= velocity_limit[j]
-    if limits.shape[0] == 0:
-        return (dt * lambda_ + mu if passes else 0.0), lambda_, by_last
     allowed = clip(command, velocity_limit[j])
     passes = passes and abs(allowed) <= limits[FASTEST, j]
     allowed = clip(allowed, limits[FASTEST, j])

@@ -15,7 +15,7 @@ from baselines.agents.bilinear.processing import Bilinear
 from baselines.policy import Problem
 from baselines.training.gradients.adjoint import Gradient, adjoint
 from baselines.training.gradients.jacobian import jacobian_gradient_rows, jacobian_rows
-from baselines.training.gradients.segment import Path, Rows, Task, segment
+from baselines.training.gradients.segment import Path, Rows, segment
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.threads import in_chunks
 from ikgym.rl.twists import twist_size
@@ -46,7 +46,7 @@ class Law:
             raise InvalidInputError(f"Scenario {scenario.name!r}: its first pose is not that of the arm.")
         problem = Problem.of(scenario)
         self.inputs, self.outputs = processing.size(problem), processing.outputs(problem)
-        self.task = Task.of(scenario)
+        self.task = Problem.of(scenario.replace(model=scenario.arm)).kernel_model
         self.chain, self._offsets, self._damping = (
             scenario.model.chain,
             np.array(processing.offsets),

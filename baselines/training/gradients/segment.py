@@ -9,48 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.bilinear.kernels import joint_command
-from ikgym.arms.limits import limit_rows
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
-from ikgym.kernels.cost import CostParameters
 from ikgym.kernels.jit import inlined, kernel
-from ikgym.kernels.kinematics import Chain, forward
+from ikgym.kernels.kinematics import forward
 from ikgym.kernels.limits import LOWER, UPPER, clip, limit_command, stop_at_limit
 from ikgym.rl.twists import is_turned, turn, twist, twist_size
-from ikgym.scenarios import Scenario
 
 Floats = npt.NDArray[np.float64]
-
-
-class Task(NamedTuple):
-    """The constants of all arms and steps.
-
-    Attributes:
-        chain: The arm.
-        kind: Of task coordinates, see :mod:`ikgym.kernels.tasks`.
-        error_size: e.
-        dt: Δt in [s].
-        velocity_limit: The velocity at an action of 1, in [rad/s] or [m/s]. Shape (n,).
-        limits: See :func:`ikgym.arms.limits.limit_rows`. Shape (4, n), or (0, n) where there are none.
-        cost: Of the tracking error and of the joint velocities.
-    """
-
-    chain: Chain
-    kind: int
-    error_size: int
-    dt: float
-    velocity_limit: Floats
-    limits: Floats
-    cost: CostParameters
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> Task:
-        """The constants of a scenario."""
-        limits = limit_rows(scenario.arm, scenario.largest_qdot, scenario.dt)
-        velocity_limit, cost = scenario.velocity_limit.copy(), scenario.cost.parameters
-        return cls(
-            scenario.arm.chain, scenario.task.kind, scenario.task.error_size, scenario.dt, velocity_limit, limits, cost
-        )
 
 
 class Rows(NamedTuple):
@@ -92,22 +58,22 @@ class Path(NamedTuple):
 
 
 @kernel
-def segment(task, rows, output, path, start, stop):
+def segment(model, rows, output, path, start, stop):
     """Moves arms.
 
     Args:
-        task: A :class:`Task`.
+        model: See :class:`baselines.policy_kernels.Model`; limits of braking and jerk do not count.
         rows: A :class:`Rows`.
         output: (G, h) of each arm, see :func:`baselines.agents.bilinear.kernels.action_rows`. Shape (N, n (w + 1)).
         path: A :class:`Path` with the first `q` and `qdot`; receives everything else.
         start: The first row.
         stop: The row after the last.
     """
-    chain, kind, e, dt, velocity_limit, limits, cost = task
+    chain, kind, cost, dt, velocity_limit, limits = model
     nominal, counted, steps, speed = rows
     q_path, qdot_path, total, distance = path
     prismatic, axis, m, n = chain.prismatic, chain.axes[0], nominal.shape[2], q_path.shape[2]
-    turned, w, limited = is_turned(kind, prismatic), twist_size(kind), limits.shape[0] > 0
+    turned, w, e = is_turned(kind, prismatic), twist_size(kind), task_kernels.error_size(kind, m)
     rotation, position, pose = np.empty((3, 3)), np.empty(3), np.empty(m)
     error, due, held = np.empty(max(e, 6)), np.empty(w), np.zeros((1, 3))
     for row in range(start, stop):
@@ -122,11 +88,9 @@ def segment(task, rows, output, path, start, stop):
                 turn(axis, -q[0], due)
             for j in range(n):
                 command = joint_command(output[row], j, due, speed[row], dt)
-                applied[j] = clip(command, velocity_limit[j])
-                if limited:
-                    applied[j] = limit_command(limits, j, applied[j], qdot[j], 0.0, held, 0)
+                applied[j] = limit_command(limits, j, clip(command, velocity_limit[j]), qdot[j], 0.0, held, 0)
                 reached[j] = q[j] + dt * applied[j]
-                if limited and not limits[LOWER, j] <= reached[j] <= limits[UPPER, j]:
+                if not limits[LOWER, j] <= reached[j] <= limits[UPPER, j]:
                     reached[j], applied[j] = stop_at_limit(limits, j, q[j], reached[j], dt)
             forward(chain, reached, rotation, position)
             task_kernels.coordinates(kind, rotation, position, pose)

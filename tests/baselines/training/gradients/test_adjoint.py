@@ -7,8 +7,10 @@ import pytest
 
 from baselines.agents.bilinear.features import mean_twists
 from baselines.agents.bilinear.kernels import action_rows
+from baselines.policy import Problem
+from baselines.policy_kernels import Model
 from baselines.training.gradients.adjoint import Gradient, adjoint
-from baselines.training.gradients.segment import Path, Rows, Task, segment
+from baselines.training.gradients.segment import Path, Rows, segment
 from ikgym import TrackingCost, arms, scenarios, tasks
 from ikgym.rl.twists import twist_size
 from ikgym.simulator import Simulator
@@ -24,7 +26,7 @@ GAIN = 0.02
 class Case:
     """Arms near a reference that goes past them, and the gradient of a number by all that a segment begins with."""
 
-    task: Task
+    task: Model
     rows: Rows
     start: list[np.ndarray]
     by_end: list[np.ndarray]
@@ -33,11 +35,9 @@ class Case:
     def of(cls, arm, kind, limited, cost, seed=0):
         rng = np.random.default_rng(seed)
         n, home = arm.joints, rng.uniform(-1.0, 1.0, arm.joints)
-        limits = np.empty((0, n))
-        if limited:
-            ones = np.ones(n)
-            limits = np.array([home - 0.06, home + 0.06, 0.8 * ones, 0.5 * ones])
-        task = Task(arm.chain, kind.kind, kind.error_size, DT, np.ones(n), limits, cost.parameters)
+        ones = np.ones(n) if limited else np.full(n, np.inf)
+        limits = np.array([home - 0.06 * ones, home + 0.06 * ones, 0.8 * ones, 0.5 * ones])
+        task = Model(arm.chain, kind.kind, cost.parameters, DT, np.ones(n), limits)
         q = home + rng.uniform(-0.05, 0.05, (ROWS, n))
         way = home + np.cumsum(rng.normal(scale=0.02, size=(ROWS, STEPS, n)), 1)
         nominal = kind.coordinates(*arm.forward(way))
@@ -136,7 +136,8 @@ def test_a_segment_is_the_environment(name):
     scenario, offsets = known(name).replace(steps=12, iterations_per_point=2), np.array([1, 7])
     simulator = Simulator(scenario, 1, tuple(offsets.tolist()))
     simulator.reset(np.ones(1, dtype=bool), [np.random.default_rng(3)])
-    out, task, n = simulator.observe(), Task.of(scenario), scenario.joints
+    out, n = simulator.observe(), scenario.joints
+    task = Problem.of(scenario.replace(model=scenario.arm)).kernel_model
     chain, w, counted = task.chain, twist_size(task.kind), scenario.counted()
     output = np.random.default_rng(1).normal(scale=2.0, size=(1, n * (w + 1)))
     for k in range(scenario.steps):
