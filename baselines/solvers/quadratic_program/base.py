@@ -46,7 +46,7 @@ class VelocityProgram(ResolvedRate, abc.ABC):
         joint_weights: w, above 0: how costly the motion of a joint is; only ratios count. One number, or one a joint.
             If left out, (v_max / v)^1.1 of the largest joint velocities v for slow joints, with v < v_max / 3, 1 for
             others, so that slow joints do little of what others can do; equal ones where the model has no velocity
-            limits.
+            limits, and among bodies, where the others need them to give way.
 
     Raises:
         InvalidInputError: A number is out of its range.
@@ -84,7 +84,7 @@ class VelocityProgram(ResolvedRate, abc.ABC):
             braking=self.braking_share if brakes else 0.0,
             secondary_share=SECONDARY_SHARE if self.soft else math.inf,
             secondary_limit=read_only(np.where(slow, SLOW_SHARE * self.problem.largest_qdot, math.inf)),
-            weights=self.weights_of(self.joint_weights),
+            weights=self.weights_of(1.0 if self.among_bodies and self.joint_weights is None else self.joint_weights),
             pull=read_only(np.array([gains, target])),
         )
 

@@ -78,6 +78,16 @@ def test_every_path_among_bodies_can_be_followed_and_only_by_a_solver_that_looks
     assert played(scenario, "dls").stopped[-1]
 
 
+def test_slow_joints_give_way_like_others():
+    """With weights as in free space they leave it to the others, which costs 7 times as much."""
+    scenario = ikgym.scenarios.get("tiago-table").replace(steps=100)
+    weighed = baselines.make("qp", scenario.replace(collisions=False, obstacles=()))
+    assert weighed.weights.max() > 10.0
+    assert (baselines.make("qp", scenario).weights == 1.0).all()
+    chosen = baselines.make("qp", scenario, joint_weights=tuple(weighed.weights))
+    np.testing.assert_array_equal(chosen.weights, weighed.weights)
+
+
 def test_null_space_leads_away():
     scenario = clear_scenario((BESIDE,))
     seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
