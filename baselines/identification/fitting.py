@@ -199,7 +199,11 @@ def simulate_lag(part: Part, lag: Lag) -> FloatArray:
 
 
 def _deviations(part: Part, delay: float, constant: float, gain: float, where: Any) -> tuple[float, ...]:
-    """Standard deviations, see :class:`Lag`: errors within a block may depend on each other."""
+    """Standard deviations, see :class:`Lag`.
+
+    The larger ones of two: errors depend on each other within blocks, whose spread few blocks underestimate; or they
+    are white (the bound of Cramér and Rao).
+    """
     base = np.array([delay, max(constant, FASTEST), gain])
 
     def output(values: FloatArray) -> FloatArray:
@@ -213,11 +217,11 @@ def _deviations(part: Part, delay: float, constant: float, gain: float, where: A
     scores = np.zeros((part.block.max() + 1, 3))
     np.add.at(scores, part.block[where], slopes * rest[:, None])
     inverse = np.linalg.pinv(slopes.T @ slopes)
-    spread = inverse @ (scores.T @ scores) @ inverse
+    spreads = inverse @ (scores.T @ scores) @ inverse, np.square(rest).mean() * inverse
     ratio = part.period / base[1]
     latency = np.array([1.0, ratio / base[1] / (4.0 * math.sinh(0.5 * ratio) ** 2), 0.0])
-    variances = [*np.diag(spread), latency @ spread @ latency]
-    return tuple(math.sqrt(max(float(variance), 0.0)) for variance in variances)
+    variances = np.max([[*np.diag(spread), latency @ spread @ latency] for spread in spreads], axis=0)
+    return tuple(np.sqrt(np.maximum(variances, 0.0)).tolist())
 
 
 def simulate_drive(part: Part, whole: int, row: Any) -> FloatArray:

@@ -25,6 +25,8 @@ JITTER, RARE = 0.3, 0.02
 OUTSIDE = 0.2
 #: A command this close to its limit is saturated, in shares of it; and the share of rows in which it may be.
 AT_LIMIT, SATURATED = 0.999, 0.02
+#: Commands of so many times the velocity limit are not saturated, but in degrees.
+BEYOND = 3.0
 
 
 class Log(NamedTuple):
@@ -208,7 +210,11 @@ def _check_limits(arm: Arm, q: Any, command: Any) -> None:
     if (held > SATURATED).any():
         j = int(np.argmax(held))
         unit = "m/s" if arm.prismatic[j] else "rad/s"
+        fastest = float(np.abs(command[:, j]).max())
+        hint = "what a saturated drive does is no drive's lag"
+        if not arm.prismatic[j] and fastest > BEYOND * arm.velocity_limit[j]:
+            hint = f"up to {fastest:.4g}, these look like degrees"
         raise InvalidInputError(
             f"command.{arm.joint_names[j]}: expected commands within the velocity limit of {arm.velocity_limit[j]:.4g} "
-            f"{unit}, got {100 * held[j]:.0f} % of them at it or beyond: what a saturated drive does is no drive's lag."
+            f"{unit}, got {100 * held[j]:.0f} % of them at it or beyond: {hint}."
         )

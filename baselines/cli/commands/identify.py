@@ -91,7 +91,8 @@ def _work(options: Options, _: str) -> None:
     seconds = log.period * (len(log.q) - 1)
     print(f"{arm.name}: {seconds:.4g} s at a control period of {1e3 * log.period:.4g} ms\n")
     print(shell.align(found.table(test), shell.width()))
-    print("".join(f"\nwarning: {line}" for line in found.warnings()), end="")
+    if warnings := found.warnings():
+        print("", *(f"warning: {line}" for line in warnings), sep="\n")
     if options.out is not None:
         found.save(options.out)
         print(f"\n{options.out}: a plant for scenarios and a controller at {1e3 * log.period:.4g} ms")

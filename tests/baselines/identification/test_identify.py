@@ -63,8 +63,12 @@ def test_the_drives_of_the_simulator_are_recovered(log, bits):
     np.testing.assert_allclose([lag.time_constant for lag in lags], CONSTANTS, rtol=0.1 if bits else 0.03)
     np.testing.assert_allclose([lag.gain for lag in lags], LAGS.gain, rtol=2e-3)
     np.testing.assert_allclose(latency, wanted, atol=0.1)
-    if not bits:
-        np.testing.assert_allclose([lag.delay for lag in lags], DELAYS, atol=0.1)
+    late = np.array([lag.delay for lag in lags]) - DELAYS
+    if bits:  # the log tells no more of the fast drives, by the bound of Cramér and Rao
+        assert (np.abs(late) < 3.0 * np.array([lag.deviations[0] for lag in lags])).all()
+        assert min(lag.deviations[0] for lag in lags[:2]) > 0.1
+    else:
+        np.testing.assert_allclose(late, 0.0, atol=0.1)
         np.testing.assert_allclose(found.plant.plant.bandwidth, LAGS.bandwidth, rtol=0.03)
     assert not found.shaped
     assert not found.warnings()
@@ -122,7 +126,7 @@ BAD = {
     ),
     "command in degrees": (
         lambda f: f.assign(**{name: np.degrees(f[name]) for name in f if name.startswith("command")}),
-        "got 9?8?\\d+ % of them|degrees and radians",
+        "these look like degrees",
     ),
     "measured": (_measure, "these look like measured velocities"),
     "swapped": (_swap, "got a motion that follows command.panda_joint[26]: joints are swapped"),
@@ -132,7 +136,7 @@ BAD = {
     "a second": (lambda f: f[:500], "expected at least 4 s, got 0.998 s"),
     "saturated": (
         lambda f: f.assign(**{"command.panda_joint1": np.sign(np.sin(9.0 * f.t)) * 2.175}),
-        "command.panda_joint1: .* got 9\\d+ % of them|command.panda_joint1: .* got 100 % of them",
+        "command.panda_joint1: .* got (9\\d|100) % of them at it or beyond: what a saturated drive does",
     ),
     "two periods": (
         lambda f: f.assign(t=np.cumsum(np.where(f.index < 4000, PERIOD, 2.0 * PERIOD))),
