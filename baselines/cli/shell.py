@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import io
 import itertools
+import logging
 import os
 import pathlib
 import re
@@ -136,6 +137,23 @@ class _Escaped:
 
 
 @contextlib.contextmanager
+def messages_once() -> Iterator[None]:
+    """Drops log messages that repeat: a URDF file is read again to open its meshes."""
+    seen, logger = set[str](), logging.getLogger("ikgym")
+
+    def is_new(record: logging.LogRecord) -> bool:
+        text, count = record.getMessage(), len(seen)
+        seen.add(text)
+        return len(seen) > count
+
+    logger.addFilter(is_new)
+    try:
+        yield
+    finally:
+        logger.removeFilter(is_new)
+
+
+@contextlib.contextmanager
 def escaped_output() -> Iterator[None]:
     """Escapes control characters of names and files in all that is printed."""
     out: Any = _Escaped(sys.stdout)
@@ -177,7 +195,7 @@ class Command(Generic[P]):
             options = parse(self.options, given, prog=prog, description=manual, rules=self.rules)
             if self.kept and (out := getattr(options, "out", "")) is not None:
                 stopped = f"Stopped. {self.kept.format(out=out)}"
-            with escaped_output():
+            with escaped_output(), messages_once():
                 return self.work(options, shlex.join([*prog.split(), *given])) or 0
 
         return run(both, lambda: stopped)

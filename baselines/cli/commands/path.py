@@ -209,7 +209,7 @@ def _verdict(found: Survey, driven: Retimed | None, planned: Plan | None) -> lis
     elif driven.solver != PREFERRED:
         how += " (its slow joints are spared, which takes less time)"
     hold = "all limits hold" if not _find_unstated(found.scenario.arm).any() else f"velocities hold, {_peak(driven)}"
-    used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve else ""
+    used = f", at most {100 * driven.share:.0f} % of them are used" if found.reserve and driven.share <= 1.0 else ""
     lines = [f"{_when(found, driven)}: {how}, {hold}{used}.", f"start = [{start}]"]
     if driven.solver != PREFERRED:
         where = f"Controller(…, {driven.solver!r})"

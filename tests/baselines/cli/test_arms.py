@@ -33,6 +33,19 @@ def printed(capsys, *words):
     return capsys.readouterr().out
 
 
+def test_remarks_on_a_file_appear_once(capsys, caplog, tmp_path):
+    """Though the file is read again to open the mesh."""
+    shape = "<collision><geometry>{}</geometry></collision>"
+    shapes = shape.format('<sphere radius="0"/>') + shape.format('<mesh filename="arm.stl"/>')
+    joint = '<joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 3"/></joint>'
+    text = f'<robot name="small"><link name="base"/><link name="arm">{shapes}</link>{joint}</robot>'
+    (tmp_path / "small.urdf").write_text(text, encoding="utf-8")
+    for _ in range(2):
+        caplog.clear()
+        printed(capsys, tmp_path / "small.urdf")
+        assert caplog.text.count("radius 0 is left out") == caplog.text.count("scaled to unit length") == 1
+
+
 @pytest.mark.parametrize("robot", CHAINS)
 def test_several_tips_are_shown_and_one_is_asked_for(robot, capsys):
     base, tip, joints, count = CHAINS[robot]
