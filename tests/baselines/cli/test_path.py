@@ -190,7 +190,7 @@ def test_obstacles_of_a_file(capsys):
 @pytest.fixture
 def worse_qp(monkeypatch):
     """A `qp` that errs by half a millimetre more, as near a singularity, and one start."""
-    whole = module.played
+    whole = module.play_from
 
     def worse(scenario, starts, solver="qp"):
         motion = whole(scenario, starts, solver)
