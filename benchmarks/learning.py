@@ -116,11 +116,13 @@ def curve(training: Training) -> list[Line]:
     return lines
 
 
-def table(lines: Sequence[Line]) -> list[Line]:
-    """Interquartile means over the seeds, a line for each algorithm and environment."""
+def table(lines: Sequence[Line], seeds: int = 5) -> list[Line]:
+    """Interquartile means over the seeds, a line for each algorithm and environment that has as many."""
     out = []
     for group, found in _groups(lines).items():
         last = [line for line in found if line["test_log_cost"]]
+        if len(last) < seeds:
+            continue
         cost = np.expm1([[float(line["test_log_cost"])] * EPISODES for line in last])
         score = rl.score({group[0]: cost}, "test")[group[0]]
         steps, seconds = (float(np.median([float(one[name]) for one in last])) for name in ("steps", "core_seconds"))

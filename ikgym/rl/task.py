@@ -45,14 +45,14 @@ squares of the model, as shares of the largest |
     newest first: where measurements are late or missing, earlier commands and measurements tell where the arm is now.
     An episode begins with its first observation repeated.
 
-    *Rewards.* From 0 to 1, of the stage cost c, which counts true errors, velocities and proximity:
+    *Rewards.* Of the stage cost c, which counts true errors, velocities and proximity, from 0 to 1:
 
         reward = 1 / (1 + (√c · 1 mm / h)^k)
 
-    h is `half`, k `steepness`. With Δx = 1 mm and P_X = 2, √c · 1 mm is a distance where 1 rad counts as 1 m. This
-    reward is 0 in steps that are not `counted`. With `progress` K, each step is also rewarded by K times the change of
-    this quotient from the step before, at first from that of the errors shown. Such a shaping by potentials (Ng, Harada
-    and Russell 1999) is below 0 where an arm moves away; it adds up to the difference between start and end.
+    h is `half`, k `steepness`. With Δx = 1 mm and P_X = 2, √c · 1 mm is a distance where 1 rad counts as 1 m. Steps
+    that are not `counted` have the reward 0. With `progress` K, each step is also rewarded by K times the change of
+    the quotient in this step. Such a shaping by potentials (Ng, Harada and Russell 1999) is below 0 where an arm moves
+    away, and adds up to the difference between the start, as the first observation shows it, and the end.
 
     Args:
         scenario: A scenario or its name, see `ikgym.scenarios.find`.
