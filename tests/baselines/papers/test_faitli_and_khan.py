@@ -31,7 +31,7 @@ def test_a_degraded_error_has_not_remained(monkeypatch, growth, largest, visible
     """An error of 9 m is visible on this path, and one of 1 nm is not."""
     before = Errors(0.04, 0.1, largest, 0.2)
     after = Errors(*((1.0 + growth) * error for error in before))
-    monkeypatch.setattr(khan, "_weighted", lambda *_: (before, after))
+    monkeypatch.setattr(khan, "_errors_with_weights", lambda *_: (before, after))
     degraded, runs = growth > 0.1, Runs(steps=60)
     for claim in (khan.f_weights_orientation_down, khan.f_couples, khan.w_degrades_q7_and_q8):
         assert claim(runs).verdict == ("reproduced" if degraded else "contradicted")
