@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 
 import gymnasium
@@ -45,7 +46,8 @@ class UnknownNameError(IkgymError, LookupError):
         listing = list_names(self.available) or "none"
         shown = " ".join(repr(name).split())  # arrays take several lines
         shown = shown if len(shown) <= SHOWN else f"{shown[: SHOWN - 1]}…"
-        super().__init__(f"There is no {kind} {shown}.{hint} Available: {listing}.")
+        noun, *owner = re.split(r"(?= (?:of|in) )", kind, maxsplit=1)
+        super().__init__(f"There is no {noun} {shown}{''.join(owner)}.{hint} Available: {listing}.")
 
     def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, object, tuple[str, ...]]]:
         return type(self), (self.kind, self.name, self.available)

@@ -139,8 +139,8 @@ def test_what_does_not_suit_is_refused(on):
     ("name", "on", "parameters", "message"),
     [
         ("rhc_gradent", "varga7-fast", {}, r"no policy 'rhc_gradent'\. Did you mean 'rhc_gradient'\?"),
-        ("dls", "varga7-fast", {"dampng": 1.0}, r"no parameter of dls 'dampng'\. Did you mean 'damping'\?"),
-        ("dls", "varga7-fast", {"problem": 1.0}, "no parameter of dls 'problem'"),
+        ("dls", "varga7-fast", {"dampng": 1.0}, r"no parameter 'dampng' of dls\. Did you mean 'damping'\?"),
+        ("dls", "varga7-fast", {"problem": 1.0}, "no parameter 'problem' of dls"),
         ("dls", "varga7-fat", {}, r"no scenario 'varga7-fat'\. Did you mean 'varga7-fast'\?"),
     ],
 )

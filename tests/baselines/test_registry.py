@@ -135,7 +135,7 @@ def test_what_is_refused_leaves_nothing_behind(name, place, message):
     ("content", "message"),
     [
         (None, "ModuleNotFoundError: No module named 'other_module'"),
-        ("x = 1", "no attribute of other_module 'Policy'"),
+        ("x = 1", "no attribute 'Policy' of other_module"),
         ("class Policy(", "SyntaxError"),
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
         ("Policy = 3", "expected a class derived from SolverPolicy, got 3"),
@@ -159,7 +159,7 @@ def test_an_import_path_is_as_good_as_a_name():
     assert isinstance(baselines.make("smoothed", "varga7-fast", policy=path).inner, DampedLeastSquares)
     with pytest.raises(UnknownNameError, match="Did you mean 'gain'"):
         baselines.make(path, "zhang3-helix", gian=0.5)
-    with pytest.raises(InvalidInputError, match=r"no attribute of .* 'Damped'"):
+    with pytest.raises(InvalidInputError, match=r"no attribute 'Damped' of .*"):
         baselines.get(f"{DampedLeastSquares.__module__}:Damped")
 
 

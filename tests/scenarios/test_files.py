@@ -363,7 +363,7 @@ def test_like_another_scenario(tmp_path):
     changed = circle.replace(name="mine", steps=9, arm=circle.arm.replace(tool=[0.0, 0.0, 0.2]))
     assert identical(fields(read), fields(changed))
     file.write_text("name = 'mine'\nlike = 'panda-cirle'")
-    with pytest.raises(UnknownNameError, match=r"no scenario in .*'panda-cirle'\. Did you mean 'panda-circle'"):
+    with pytest.raises(UnknownNameError, match=r"no scenario 'panda-cirle' in .*\. Did you mean 'panda-circle'"):
         load(file)
 
 

@@ -96,9 +96,9 @@ def parts(file):
             for x in (None, "track", True)
         ),
         (lambda t, a: a["processing"].update(kind="raw"), "kind bilinear or track, got 'raw'"),
-        (lambda t, a: a["processing"].update(future=1), "no field of the processing 'future'"),
+        (lambda t, a: a["processing"].update(future=1), "no field 'future' of the processing"),
         (lambda t, a: a["processing"].update(ahead=[2, 1]), "rising times above 0"),
-        (lambda t, a: a["network"].update(activation="gelu"), "no choice of activation 'gelu'"),
+        (lambda t, a: a["network"].update(activation="gelu"), "no choice 'gelu' of activation"),
         (lambda t, a: a["network"].update(sizes=[10**12, 10**12]), "tensors: expected float32 of the shapes"),
         (lambda t, a: a.update(joints=6), "changed after it was written"),
         (lambda t, a: t.pop("layers.0.bias"), "tensors: expected float32 of the shapes"),
@@ -127,7 +127,7 @@ REFUSED = [
     *((lambda number=number: Bilinear((1, 5), number), "damping: ") for number in (0.0, float("nan"), "much")),
     (lambda: Bilinear((1, 5)).outputs(SKEW), "task: expected another than skew coordinates"),
     (lambda: Bilinear.from_json({"damping": None}), "damping: expected a finite number above 0"),
-    (lambda: network((2, 2), "relo"), "no choice of activation 'relo'"),
+    (lambda: network((2, 2), "relo"), "no choice 'relo' of activation"),
 ]
 
 

@@ -99,7 +99,7 @@ def test_a_class_that_is_not_registered_is_named_by_its_import_path():
 
     (row,) = evaluate(HELIX, Mine, steps=3)
     assert row.policy == f"{__name__}:{Mine.__qualname__}"
-    with pytest.raises(UnknownNameError, match=r"no parameter of .*Mine 'dampin'"):
+    with pytest.raises(UnknownNameError, match=r"no parameter 'dampin' of .*Mine"):
         evaluate(HELIX, (Mine, {"dampin": 1}), steps=3)
 
 
@@ -211,7 +211,7 @@ def test_invalid_actions_are_refused(result, message):
     ("name", "message"),
     [
         ("number", "an object with a predict, or a class or function that makes one, got 3"),
-        ("Foreign:dampin=1", "There is no parameter of dls 'dampin'"),
+        ("Foreign:dampin=1", "There is no parameter 'dampin' of dls"),
         ("refuse", "Nothing to evaluate: .*refuse in zhang3-helix: only for seven joints"),
     ],
 )

@@ -12,7 +12,7 @@ from tests.baselines.training.small import tiny
 
 #: Refused options, and a part of the message.
 REFUSED = [
-    ({"windo": 3}, "no option of apg 'windo'. Did you mean 'window'"),
+    ({"windo": 3}, "no option 'windo' of apg. Did you mean 'window'"),
     ({"activation": "sili"}, "Did you mean 'silu'"),
     ({"hidden": []}, "hidden: expected 1 to 10 whole numbers"),
     ({"hidden": [8, 0]}, "hidden: expected a whole number from 1 to 2048, got 0"),
@@ -49,7 +49,7 @@ def test_values_of_segments():
 def test_presets(tmp_path):
     assert preset_names() == ("quick", "standard", "long", "smoke")
     (tmp_path / "mine.toml").write_text("windo = 2\n")
-    with pytest.raises(IkgymError, match="no option of apg 'windo'"):
+    with pytest.raises(IkgymError, match="no option 'windo' of apg"):
         APG.preset(str(tmp_path / "mine.toml"))
     (tmp_path / "mine.toml").write_text("window = \n")
     os.mkfifo(tmp_path / "pipe.toml")
