@@ -96,7 +96,7 @@ def about(training: Training) -> Line:
 
 def curve(training: Training) -> list[Line]:
     """Trains, and gives the lines of the curve; the last one has the test."""
-    config = training.config
+    config, known = training.config, about(training)
     if training.imitates:
         settings, since = read_settings(config), time.process_time()
         model: Any = imitate(config.env, settings, training.seed)
@@ -110,7 +110,7 @@ def curve(training: Training) -> list[Line]:
         with (training.folder / "curve.csv").open(encoding="utf-8", newline="") as stream:
             rows = list(csv.DictReader(stream))
         model = ALGORITHMS[config.algorithm].load(training.folder / "model.zip", device="cpu")
-    lines: list[Line] = [{**about(training), **row, "test_log_cost": None} for row in rows]
+    lines: list[Line] = [{**known, **row, "test_log_cost": None} for row in rows]
     cost = rl.costs(model, config.env, split="test", episodes=EPISODES)
     lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
     return lines

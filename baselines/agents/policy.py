@@ -206,7 +206,7 @@ class AgentTrack(AgentAlone):
         InvalidInputError: The file has another hash, or the scenario does not fit the agent.
     """
 
-    hash: str = "93c87248eb01"
+    hash: str = "b171f315d892"
 
     name: ClassVar[str] = "agent_track"
 
