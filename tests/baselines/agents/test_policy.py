@@ -148,4 +148,4 @@ def test_the_agent_of_an_environment_by_id_follows_another_panda():
     assert policy.file.about["training"]["env"] == "ikgym/Track-v0"
     assert policy.preview == (5, 25)
     rows = evaluate("panda-random", "agent_track", episodes=4)
-    assert 1e-4 < np.median([row.position_error_rms for row in rows]) < 3e-3
+    assert 1e-4 < np.median([row.position_error_rms for row in rows]) < 5e-3
