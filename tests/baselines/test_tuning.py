@@ -159,7 +159,11 @@ def test_parameters_within_another_and_under_a_condition():
         ('[dls]\ngain = { low = 1, high = 2, when = { rule = ["a"] } }', UnknownNameError, "parameter above gain"),
         ("[dls]\ndamping = { low = -1.0, high = 1.0 }", InvalidInputError, "damping: expected a finite number above 0"),
         ('[mfac]\nrule = { choices = ["constant", "zzz"] }', UnknownNameError, "There is no damping rule 'zzz'"),
-        ("[follow_nominal]\ngain = { low = 0.1, high = 1.0 }", UnknownNameError, "no parameter 'gain' of follow_nominal"),
+        (
+            "[follow_nominal]\ngain = { low = 0.1, high = 1.0 }",
+            UnknownNameError,
+            "no parameter 'gain' of follow_nominal",
+        ),
     ],
 )
 def test_invalid_ranges(tmp_path, text, error, message):
