@@ -27,7 +27,7 @@ from baselines.policy import Batch, Memory, Solution, SolverPolicy, statuses
 from baselines.registry import parse_policy
 from ikgym import rl, scenarios
 from ikgym.rl.scoring import EPISODES, FILE, play
-from ikgym.rl.track import episode_rewards
+from ikgym.rl.track import cost_rewards
 from ikgym.scenarios import Preview, Scenario
 from ikgym.validation import Bounds, FloatArray
 
@@ -136,6 +136,16 @@ def counted(name: str, policy: str, split: str, episodes: int = EPISODES, *, inf
 def logarithms(episodes: Sequence[Episode], steps: int | None) -> FloatArray:
     """Logarithms of 1 + cost of the last steps of episodes, None for all of them. Shape (episodes,)."""
     return np.log1p([one.cost[-(steps or 0) :].sum() for one in episodes])
+
+
+def episode_rewards(task: rl.Task, cost: FloatArray, start: float | FloatArray = np.inf) -> FloatArray:
+    """Rewards of whole episodes with the stage costs of all steps, `start` being that before. Shapes (steps, ...)."""
+    closeness = cost_rewards(task, cost)
+    before = np.broadcast_to(cost_rewards(task, np.asarray(start)), closeness[:1].shape)
+    rewards: FloatArray = task.progress * np.diff(closeness, axis=0, prepend=before)
+    counted = slice(-(task.counted or 0), None)
+    rewards[counted] += closeness[counted]
+    return rewards
 
 
 def returns(task: rl.Task, episodes: Sequence[Episode]) -> FloatArray:

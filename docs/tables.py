@@ -74,7 +74,7 @@ def markdown(rows: Iterable[tuple[str, ...]]) -> str:
     return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
 
 
-def measure(name: str, *words: str) -> str:
+def csv_table(name: str, *words: str) -> str:
     """The table of a CSV file.
 
     `columns=NAME,NAME` chooses columns, `NAME=VALUE|VALUE` lines with such a value. With `across=NAME cells=NAME` each
@@ -97,7 +97,7 @@ def table(words: str) -> str:
     """The table, or the text, of the words after `<!-- table:`."""
     name, *rest = shlex.split(words)
     if name.startswith("results/"):
-        return measure(name.removeprefix("results/").removesuffix(".csv"), *rest)
+        return csv_table(name.removeprefix("results/").removesuffix(".csv"), *rest)
     return claims() if name == "claims" else markdown(TABLES[name]())
 
 

@@ -65,7 +65,7 @@ class Learner:
         self._shape = self._fraction.shape if rows is None else (rows, scenario.joints)
         self._task, self._from = task, scenario.steps - (task.counted or scenario.steps)
         self._first = slice(2 * scenario.joints, 2 * scenario.joints + twist_size(kind))  # features of the first error
-        self._before = np.zeros(rows or 1)
+        self._closeness = np.zeros(rows or 1)  # before the step, from 0 to 1
 
     def reset(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
         """The observations after a reset; where no episode has begun, they are those of the last step.
@@ -115,13 +115,17 @@ class Learner:
             cost: Their stage costs. Shape (N,).
             before: Steps that the episodes had before. Shape (N,) or ().
         """
-        near, earlier = cost_rewards(self._task, cost), self._before
-        self._before = near
-        return np.where(np.asarray(before) < self._from, 0.0, near) + self._task.progress * (near - earlier)
+        closeness = cost_rewards(self._task, cost)
+        rewards = np.where(np.asarray(before) < self._from, 0.0, closeness)
+        if self._task.progress:
+            rewards += self._task.progress * (closeness - self._closeness)
+            self._closeness = closeness
+        return rewards
 
     def _shown(self, features: Features, begun: BoolArray) -> Features:
-        twist = features[begun, self._first].astype(np.float64) * (self._task.coarse / UNIT)
-        self._before[begun] = cost_rewards(self._task, (twist * twist).sum(axis=1))
+        if self._task.progress:
+            twist = features[begun, self._first].astype(np.float64) * (self._task.coarse / UNIT)
+            self._closeness[begun] = cost_rewards(self._task, (twist * twist).sum(axis=1))
         self._history[begun] = features[begun, None]
         return self._history.reshape(len(self._history), -1).copy()
 
@@ -156,16 +160,6 @@ class Learner:
 def cost_rewards(task: Task, cost: FloatArray) -> FloatArray:
     """Rewards 1 / (1 + (√c · 1 mm / h)^k) of stage costs c, see :class:`ikgym.rl.Task`. Shapes (...)."""
     rewards: FloatArray = 1.0 / (1.0 + (np.sqrt(cost) * (UNIT / task.half)) ** task.steepness)
-    return rewards
-
-
-def episode_rewards(task: Task, cost: FloatArray, start: float | FloatArray = np.inf) -> FloatArray:
-    """Rewards of whole episodes with the stage costs of all steps, `start` being that before. Shapes (steps, ...)."""
-    near = cost_rewards(task, cost)
-    before = np.broadcast_to(cost_rewards(task, np.asarray(start)), near[:1].shape)
-    rewards: FloatArray = task.progress * np.diff(near, axis=0, prepend=before)
-    counted = slice(-(task.counted or 0), None)
-    rewards[counted] += near[counted]
     return rewards
 
 

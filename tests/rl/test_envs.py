@@ -33,7 +33,7 @@ def context(seed):
     [
         rl.Task(short(), lost_distance=0.12, share=0.02, history=2, commands=2),
         rl.Task(short("panda-camera-slow"), lost_distance=0.0003, history=2, commands=2),
-        rl.Task(CONTEXT, lost_distance=None, context=True, counted=3),
+        rl.Task(CONTEXT, lost_distance=None, context=True, counted=3, progress=2.0),
         rl.Task(short("learning-track"), lost_distance=0.03, inverse=True, history=2),
     ],
     ids=lambda task: task.scenario.name,
