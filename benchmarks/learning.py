@@ -18,7 +18,7 @@ import multiprocessing
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import tyro
@@ -41,6 +41,7 @@ RUN, GROUP = ("environment", "algorithm", "settings", "digest", "seed"), ("envir
 #: CPU time of a run with the defaults of the library, which know no number of steps, in [min].
 MINUTES = 4.0
 Line = dict[str, Any]
+Kind = Literal["published", "inverse", "defaults", "regression"]
 
 
 class Training(NamedTuple):
@@ -62,10 +63,9 @@ class Command:
     """Their ids; those that the published settings of the algorithm are for if left out."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """Of the trainings."""
-    defaults: bool = False
-    """The defaults of the library in place of the published settings."""
-    regression: bool = False
-    """Regression on the policy with score 1 in place of the algorithms, with the settings of SAC."""
+    kind: Kind = "published"
+    """Settings: the published ones, the published ones where learners also see joint velocities of the model's damped
+    inverse, the defaults of the library; or regression on the policy with score 1, with the published ones of SAC."""
     workers: int = 2
     """Processes that train at the same time."""
     runs: Path = Path("runs")
@@ -73,15 +73,17 @@ class Command:
 
     def trainings(self) -> list[Training]:
         """All of them, the first seeds first."""
-        minutes, out = MINUTES if self.defaults else None, []
-        algorithms = ("sac",) if self.regression else self.algorithms
+        imitates, out = self.kind == "regression", []
+        defaults, inverse = self.kind == "defaults", self.kind == "inverse"
+        algorithms = ("sac",) if imitates else self.algorithms
         pairs = list(itertools.product(self.environments or rl.IDS, algorithms))
         if self.environments is None:
             pairs = [(env, name) for env, name in pairs if env in read_entries(SETTINGS / f"{name}.yml")]
         for seed, (env, algorithm) in itertools.product(self.seeds, pairs):
-            config = Rewards(algorithm=algorithm, env=env, minutes=minutes, defaults=self.defaults)
-            folder = self.runs / f"{env.split('/')[1]}-{algorithm}{'-defaults' * self.defaults}" / f"seed-{seed}"
-            out.append(Training(config, seed, folder, self.regression))
+            minutes = MINUTES if defaults else None
+            config = Rewards(algorithm=algorithm, env=env, minutes=minutes, defaults=defaults, inverse=inverse)
+            folder = self.runs / "-".join((env.split("/")[1], algorithm, self.kind)) / f"seed-{seed}"
+            out.append(Training(config, seed, folder, imitates))
         return out
 
 
@@ -89,7 +91,7 @@ def about(training: Training) -> Line:
     """What a training is known by."""
     config = training.config
     digest = hashlib.sha256(json.dumps(read_settings(config), sort_keys=True).encode()).hexdigest()[:8]
-    kind = "defaults" if config.defaults else "published"
+    kind = "defaults" if config.defaults else "inverse" if config.inverse else "published"
     algorithm = "regression" if training.imitates else config.algorithm
     return dict(zip(RUN, (config.env, algorithm, kind, digest, str(training.seed)), strict=True))
 
@@ -111,7 +113,7 @@ def curve(training: Training) -> list[Line]:
             rows = list(csv.DictReader(stream))
         model = ALGORITHMS[config.algorithm].load(training.folder / "model.zip", device="cpu")
     lines: list[Line] = [{**known, **row, "test_log_cost": None} for row in rows]
-    cost = rl.costs(model, config.env, split="test", episodes=EPISODES)
+    cost = rl.costs(model, config.env, split="test", episodes=EPISODES, inverse=config.inverse)
     lines[-1]["test_log_cost"] = f"{np.log1p(cost).mean():.4f}"
     return lines
 

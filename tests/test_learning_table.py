@@ -10,14 +10,14 @@ from ikgym import rl
 from ikgym.exceptions import UnknownNameError
 
 CURVES = from_csv(learning.CURVES.read_text(encoding="utf-8"))
-PUBLISHED = [line for line in CURVES if line["settings"] == "published"]
+PUBLISHED = [line for line in CURVES if line["settings"] in ("published", "inverse")]
 
 
 def test_curves_are_of_the_published_settings(tmp_path):
     runs = {tuple(line[name] for name in learning.RUN) for line in PUBLISHED}
-    for env, algorithm, _, _, seed in runs:
+    for env, algorithm, settings, _, seed in runs:
         imitates = algorithm == "regression"
-        config = Rewards(algorithm="sac" if imitates else algorithm, env=env)
+        config = Rewards(algorithm="sac" if imitates else algorithm, env=env, inverse=settings == "inverse")
         training = learning.Training(config, int(seed), tmp_path, imitates)
         assert tuple(learning.about(training).values()) in runs
 
@@ -66,7 +66,7 @@ def test_regression_learns_the_policy_with_score_1_within_seconds(tmp_path, monk
     settings = {**read_settings(Rewards(algorithm="sac", env="ikgym/Track-v0")), "n_timesteps": 12_800}
     monkeypatch.setattr(learning, "read_settings", lambda config: settings)
     [training] = learning.Command(
-        environments=("ikgym/Track-v0",), seeds=(0,), regression=True, runs=tmp_path
+        environments=("ikgym/Track-v0",), seeds=(0,), kind="regression", runs=tmp_path
     ).trainings()
     [line] = learning.curve(training)
     assert line["algorithm"] == "regression"

@@ -218,6 +218,8 @@ class Rewards(Frozen):
     """Settings in the format of rl-zoo3; the published ones if left out."""
     defaults: bool = False
     """Take the defaults of the library and one arm in place of settings."""
+    inverse: bool = False
+    """Show the policy joint velocities of the model's damped inverse, too, see `ikgym.rl.Task`."""
     validations: _Count = 10
     """Rows of the curve, evenly spaced."""
     episodes: Annotated[int, _N, Bounds(at_least=1, at_most=EPISODES)] = 32

@@ -45,7 +45,8 @@ def train(config: Rewards, seed: int, folder: pathlib.Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     about = identity(config, seed)
     settings = about["settings"]
-    envs = ikgym.sb3.make_vec(config.env, whole_number("n_envs", settings.get("n_envs", 1), at_least=1))
+    rows = whole_number("n_envs", settings.get("n_envs", 1), at_least=1)
+    envs = ikgym.sb3.make_vec(config.env, rows, inverse=config.inverse)
     model = make(config.algorithm, envs, settings, seed)
     curve = Curve(config, settings["n_timesteps"], folder / "curve.csv")
     model.set_logger(Logger(folder=None, output_formats=[]))  # otherwise it makes a temporary folder
@@ -88,7 +89,7 @@ def identity(config: Rewards, seed: int) -> dict[str, Any]:
     """
     settings = read_settings(config)
     settings["n_timesteps"] = config.total_timesteps or settings["n_timesteps"]
-    about = {"env": config.env, "algorithm": config.algorithm, "seed": seed}
+    about = {"env": config.env, "algorithm": config.algorithm, "seed": seed, "inverse": config.inverse}
     return {**about, "settings": settings, "minutes": config.minutes}
 
 
@@ -129,8 +130,8 @@ class Curve(BaseCallback):
 
     def validate(self) -> float:
         """The present score on episodes of the split `validation`, which is written to the file."""
-        env, episodes = self._config.env, self._config.episodes
-        score = rl.score({env: [rl.costs(self.model, env, episodes=episodes)]})[env].mean
+        env, episodes, inverse = self._config.env, self._config.episodes, self._config.inverse
+        score = rl.score({env: [rl.costs(self.model, env, episodes=episodes, inverse=inverse)]})[env].mean
         self._rows.append((f"{self.spent:.1f}", str(self.num_timesteps), f"{score:.4f}"))
         write(self._file, csv_text(("core_seconds", "steps", "score"), self._rows).encode())
         self._since = time.process_time()

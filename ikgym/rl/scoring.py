@@ -50,7 +50,7 @@ class Score(NamedTuple):
     best: float
 
 
-def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 64) -> Costs:
+def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 64, **changes: Any) -> Costs:
     """Plays whole episodes, also beyond where training would end them.
 
     Args:
@@ -58,21 +58,27 @@ def costs(model: Any, name: str, *, split: str = "validation", episodes: int = 6
         name: Of the environment, such as ``"ikgym/Track-v0"``.
         split: Seeds of the episodes, see :data:`ikgym.scenarios.SPLITS`.
         episodes: Their number.
+        changes: Fields of :class:`ikgym.rl.Task` with which the model was trained, such as `inverse=True`. Scenario and
+            counted steps are those of the id.
 
     Returns:
         The benchmark's costs: of the last 50 steps of ``"ikgym/Reach-v0"``, else of all. Shape (episodes,).
 
     Raises:
         UnknownNameError: There is no such environment or split.
+        UnexpectedArgumentError: There is no such field.
         InvalidInputError: The split has fewer episodes, the model has no such `predict`, or its action is refused.
     """
     kind = environment(name)
+    task = kind.change_task(changes)
+    if (task.scenario, task.counted) != (kind.task.scenario, kind.task.counted):
+        raise InvalidInputError(f"{name}: expected its scenario and counted steps, with which scores are defined.")
     seeds = scenarios.seeds(split, whole_number("episodes", episodes, at_least=1))
     if not callable(getattr(model, "predict", None)):
         raise InvalidInputError(f"model: expected an object with the method predict, got {shorten(model)}.")
     total = np.zeros(len(seeds))
-    steps = list(play(model, kind.task, seeds))
-    for infos in steps[-(kind.task.counted or 0) :]:
+    steps = list(play(model, task, seeds))
+    for infos in steps[-(task.counted or 0) :]:
         total += infos["tracking_cost"] + infos["velocity_cost"]
     out = total.view(Costs)
     out.split = split

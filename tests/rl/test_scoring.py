@@ -145,6 +145,19 @@ def test_wrong_results_are_refused(results, message):
         rl.score(results)
 
 
+def test_models_that_see_the_inverse_are_scored_in_the_same_scenario():
+    class Inverse:
+        def predict(self, observation, state=None, **_):
+            return np.clip(observation[:, 38:45] / rl.IDS[TRACK].task.share, -1.0, 1.0), state
+
+    found = rl.costs(Inverse(), TRACK, episodes=4, inverse=True)
+    assert rl.score({TRACK: [found]})[TRACK].mean > 0.9
+    with pytest.raises(InvalidInputError, match="expected its scenario and counted steps"):
+        rl.costs(Inverse(), TRACK, episodes=1, scenario="learning-fast")
+    with pytest.raises(IkgymError, match="unexpected keyword argument 'inwerse'"):
+        rl.costs(Inverse(), TRACK, episodes=1, inwerse=True)
+
+
 def test_wrong_names_are_refused():
     for split in ("train", "thresholds"):
         with pytest.raises(IkgymError, match="Available: validation, test"):

@@ -151,6 +151,16 @@ def test_the_command_writes_model_agent_curve_and_score_and_goes_on_where_it_was
     assert "run.json differs in settings" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("settings", ["sac"], indirect=True)
+def test_learners_may_see_the_inverse(settings, tmp_path):
+    about = train(options("sac", settings=settings, inverse=True, episodes=2), 0, tmp_path / "run")
+    model = SAC.load(tmp_path / "run" / "model.zip", device="cpu")
+    assert model.observation_space.shape == (38 + 2 * 7,)
+    score = rl.score({TRACK: [rl.costs(model, TRACK, episodes=2, inverse=True)]})[TRACK].mean
+    assert score == about["validation_score"]
+    assert "agents see no history, no inverse" in about["agent"]
+
+
 @pytest.mark.parametrize("settings", ["recurrent_ppo"], indirect=True)
 def test_models_with_memory_play_with_it_and_have_no_agent(settings, tmp_path):
     about = train(options("recurrent_ppo", settings=settings), 0, tmp_path / "run")
