@@ -1,4 +1,4 @@
-"""Checks of the fields of a plant."""
+"""Checks of the fields of a plant; each raises an InvalidInputError for a value that is none of those it names."""
 
 from __future__ import annotations
 
@@ -28,16 +28,7 @@ def is_range(value: Any) -> bool:
 
 
 def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
-    """One number for all joints, or one a joint.
-
-    Args:
-        name: Name in messages.
-        value: The number or numbers.
-        signed: Whether they may be negative.
-
-    Raises:
-        InvalidInputError: They are no such numbers, not finite, or too large.
-    """
+    """One number for all joints, or one a joint; of at least 0, unless they are signed."""
     array = frozen_array(name, value, at_most=LARGEST)
     if array.ndim > 1 or not array.size or (not signed and (array < 0.0).any()):
         least = "" if signed else " of at least 0"
@@ -45,88 +36,60 @@ def joint_numbers(name: str, value: Any, *, signed: bool = False) -> PerJoint:
     return float(array) if array.ndim == 0 else tuple(array.tolist())
 
 
-def frequency(name: str, value: Any) -> Drawn | PerJoint:
-    """A frequency above 0, which may be infinite, or one a joint, or a range of finite ones.
+def positive(name: str, value: Any, below: float = math.inf) -> PerJoint:
+    """A number above 0 and below a bound for all joints, or one a joint."""
+    found = joint_numbers(name, value)
+    if np.min(found) <= 0.0 or np.max(found) >= below:
+        bound = "" if below == math.inf else f" and below {below:g}"
+        raise InvalidInputError(f"{name}: expected numbers above 0{bound}, got {shorten(value)}.")
+    return found
 
-    Raises:
-        InvalidInputError: It is none of these, or the range is the wrong way round.
-    """
-    if isinstance(value, float) and value == math.inf:
+
+def frequency(name: str, value: Any) -> Drawn | PerJoint:
+    """A frequency above 0 in [Hz], inf for none, or one a joint, or a range of finite ones."""
+    if is_range(value):
+        return _number_or_range(name, value, "numbers above 0", _frequency)
+    return resonances(name, value)
+
+
+def resonances(name: str, value: Any) -> PerJoint:
+    """A frequency above 0 in [Hz], inf for none, or one a joint, however many joints there are."""
+    given = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(given, (tuple, list)):
+        return _frequency(name, given, endless=True)
+    if not given or any(isinstance(one, (tuple, list, np.ndarray)) for one in given):
+        raise InvalidInputError(f"{name}: expected a number above 0 or one a joint, got {shorten(given)}.")
+    return tuple(_frequency(name, one, endless=True) for one in given)
+
+
+def _frequency(name: str, value: Any, *, endless: bool = False) -> float:
+    if endless and isinstance(value, float) and value == math.inf:
         return math.inf
-    if isinstance(value, (tuple, list, np.ndarray)) and len(value) and not is_range(value):
-        return tuple(
-            math.inf if isinstance(one, float) and one == math.inf else number(name, one, above=0.0, at_most=LARGEST)
-            for one in value
-        )
-    return _number_or_range(name, value, "numbers above 0", functools.partial(number, above=0.0, at_most=LARGEST))
+    return number(name, value, above=0.0, at_most=LARGEST)
 
 
 def numbers(name: str, value: Any) -> Drawn:
-    """A number of at least 0, or a range of them.
-
-    Raises:
-        InvalidInputError: It is neither, or the range is the wrong way round.
-    """
-    return _number_or_range(
-        name, value, "numbers of at least 0", functools.partial(number, at_least=0.0, at_most=LARGEST)
-    )
+    """A number of at least 0, or a range of them."""
+    check = functools.partial(number, at_least=0.0, at_most=LARGEST)
+    return _number_or_range(name, value, "numbers of at least 0", check)
 
 
 def steps(name: str, value: Any, at_least: int = 0) -> int | tuple[int, int]:
-    """A number of steps, or a range of them.
-
-    Raises:
-        InvalidInputError: It is neither, or the range is the wrong way round.
-    """
+    """A number of steps, or a range of them."""
     drawn: Any = _number_or_range(name, value, "whole numbers", functools.partial(whole_number, at_least=at_least))
     return drawn  # type: ignore[no-any-return]  # whole numbers come as such
 
 
 def delay(name: str, value: Any) -> PerJoint | tuple[int, int]:
-    """A number of steps, fractions included, or one a joint, or a range of whole numbers.
-
-    Raises:
-        InvalidInputError: It is none of these, or the range is the wrong way round.
-    """
+    """A number of steps, fractions included, or one a joint, or a range of whole numbers."""
     if is_range(value):
         return steps(name, value)
     found = joint_numbers(name, value)
     return int(found) if isinstance(found, float) and found.is_integer() else found
 
 
-def resonances(name: str, value: Any) -> PerJoint:
-    """A frequency above 0 in [Hz], inf for none, or one a joint, however many joints there are.
-
-    Raises:
-        InvalidInputError: It is none.
-    """
-    given = value.tolist() if isinstance(value, np.ndarray) else value
-    several = isinstance(given, (tuple, list))
-    found: Any = list(given) if several else [given]
-    if not found or any(isinstance(one, (tuple, list, np.ndarray)) for one in found):
-        raise InvalidInputError(f"{name}: expected a number above 0 or one a joint, got {shorten(given)}.")
-    found = tuple(frequency(name, one) for one in found)
-    return found if several else found[0]  # type: ignore[no-any-return]  # numbers alone
-
-
-def damping(name: str, value: Any) -> PerJoint:
-    """A damping ratio above 0 and below 1, or one a joint.
-
-    Raises:
-        InvalidInputError: It is none.
-    """
-    found = joint_numbers(name, value)
-    if np.min(found) <= 0.0 or np.max(found) >= 1.0:
-        raise InvalidInputError(f"{name}: expected numbers above 0 and below 1, got {shorten(value)}.")
-    return found
-
-
 def coefficients(name: str, value: Any) -> tuple[tuple[float, ...], ...]:
-    """Coefficients of drives of low order: those of one drive for all joints, or one row a joint; () for none.
-
-    Raises:
-        InvalidInputError: A row has another length, or its drive is not stable.
-    """
+    """Coefficients of stable drives of low order: of one drive for all joints, or one row a joint; () for none."""
     width = VELOCITIES + COMMANDS
     array = frozen_array(name, value, at_most=LARGEST)
     if array.size == 0:
@@ -147,24 +110,11 @@ def coefficients(name: str, value: Any) -> tuple[tuple[float, ...], ...]:
 
 
 def shares(name: str, value: Any) -> tuple[float, float]:
-    """Two different shares, the smaller one first.
-
-    Raises:
-        InvalidInputError: They are no such shares.
-    """
-    drawn = _number_or_range(name, value, "shares", share)
+    """Two different shares from 0 to 1, the smaller one first."""
+    drawn = _number_or_range(name, value, "shares", functools.partial(number, at_least=0.0, at_most=1.0))
     if not isinstance(drawn, tuple) or drawn[0] == drawn[1]:
         raise InvalidInputError(f"{name}: expected two shares (near, far) with near < far, got {value!r}.")
     return drawn
-
-
-def share(name: str, value: Any) -> float:
-    """A share from 0 to 1.
-
-    Raises:
-        InvalidInputError: It is none.
-    """
-    return number(name, value, at_least=0.0, at_most=1.0)
 
 
 def _number_or_range(name: str, value: Any, meant: str, check: Callable[[str, Any], float]) -> Drawn:

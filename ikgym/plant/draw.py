@@ -14,8 +14,7 @@ from ikgym.arms import Arm
 from ikgym.plant.arm_kernels import RANGE_STREAMS, Arms, Numbers, Ranges, Spread, draw_arms, draw_ranges
 from ikgym.plant.checks import PerJoint, is_range
 from ikgym.plant.contact import turn_bodies
-from ikgym.plant.plant import WHOLE, Plant
-from ikgym.plant.severity import scale
+from ikgym.plant.plant import Plant, scale
 from ikgym.validation import FloatArray, whole_number
 
 Keys = npt.NDArray[np.uint64]
@@ -69,7 +68,7 @@ class Draws:
             plant.axis,
         )
         low, high = np.array([plant.ends(name) for name in Numbers._fields], dtype=np.float64).T
-        whole = np.array([name in WHOLE for name in Numbers._fields])
+        whole = np.array([name in ("command_delay", "pose_every") for name in Numbers._fields])
         streams = np.array(RANGE_STREAMS, dtype=np.uint64)
         self._ranges = Ranges(low.copy(), high.copy(), whole, streams, *plant.from_middle)
 

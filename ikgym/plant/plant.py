@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 
@@ -14,20 +14,31 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.kernels.random_numbers import CUT
-from ikgym.plant import checks, severity
+from ikgym.plant import checks
 from ikgym.plant.arm_kernels import Numbers
 from ikgym.plant.checks import Drawn, PerJoint
-from ikgym.validation import LARGEST, FloatArray, number, per_joint, shorten, whole_number
+from ikgym.validation import LARGEST, Bounds, FloatArray, number, per_joint, shorten
 
-#: Fields with one number for all joints, or one a joint; and those of them that may be negative.
+#: Fields with one number for all joints, or one a joint.
 JOINT_WISE = ("zero", "payload", "backlash", "bias", "noise", "q_noise", "gain")
-SIGNED = ("payload", "bias")
-#: Fields with one number of at least 0.
-SCALARS = ("link", "axis")
-#: Fields with one number of at least 0, or a range; those that are whole numbers.
-DRAWN, WHOLE = ("calibration", "load", "pose_noise", "pose_rotation_noise"), ("command_delay", "pose_every")
 #: Delays of measurements, in steps.
 DELAYS = ("q_delay", "pose_delay")
+#: Fields that grow with a severity in proportion: deviations and noises of arm and sensors, and those of the drives.
+KNOWLEDGE = ("zero", "link", "axis", "payload", "q_noise", "pose_noise", "pose_rotation_noise", "pose_missing")
+DRIVES = ("backlash", "bias", "noise")
+
+Number = Annotated[float, Bounds(at_least=0.0, at_most=LARGEST)]
+Steps = Annotated[int, Bounds(at_least=0)]
+#: One number for all joints or one a joint, of either sign and of at least 0; and one number or a range.
+Signed = Annotated[PerJoint, functools.partial(checks.joint_numbers, signed=True)]
+Unsigned = Annotated[PerJoint, checks.joint_numbers]
+Ranged = Annotated[Drawn, checks.numbers]
+
+
+def _arms(name: str, given: Any) -> tuple[Arm, ...]:
+    if not isinstance(given, (tuple, list)) or not all(isinstance(one, Arm) for one in given):
+        raise InvalidInputError(f"{name}: expected a sequence of arms, got {shorten(given)}.")
+    return tuple(given)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -100,54 +111,32 @@ class Plant(Frozen):
             way round, or the arms are none or do not have joints of the same kinds.
     """
 
-    zero: PerJoint = 0.0
-    link: float = 0.0
-    axis: float = 0.0
-    payload: PerJoint = 0.0
-    payload_step: int = 0
-    arms: Sequence[Arm] = ()
-    calibration: Drawn = 1.0
-    load: Drawn = 1.0
-    bandwidth: Drawn | PerJoint = math.inf
-    command_delay: PerJoint | tuple[int, int] = 0
-    delay_margin: float = 0.0
-    drive: tuple[tuple[float, ...], ...] | tuple[float, ...] = ()
-    gain: PerJoint = 1.0
-    resonance: PerJoint = math.inf
-    resonance_damping: PerJoint = 0.05
-    backlash: PerJoint = 0.0
-    bias: PerJoint = 0.0
-    noise: PerJoint = 0.0
-    q_noise: PerJoint = 0.0
-    pose_noise: Drawn = 0.0
-    pose_rotation_noise: Drawn = 0.0
-    q_delay: int = 0
-    pose_delay: int = 0
-    pose_every: int | tuple[int, int] = 1
-    pose_missing: float = 0.0
-    from_middle: tuple[float, float] = (0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        settled: dict[str, Any] = {
-            **{name: checks.joint_numbers(name, getattr(self, name), signed=name in SIGNED) for name in JOINT_WISE},
-            **{name: number(name, getattr(self, name), at_least=0.0, at_most=LARGEST) for name in SCALARS},
-            **{name: checks.numbers(name, getattr(self, name)) for name in DRAWN},
-            **{name: whole_number(name, getattr(self, name), at_least=0) for name in ("payload_step", *DELAYS)},
-            "bandwidth": checks.frequency("bandwidth", self.bandwidth),
-            "command_delay": checks.delay("command_delay", self.command_delay),
-            "delay_margin": number("delay_margin", self.delay_margin, at_least=0.0, at_most=LARGEST),
-            "drive": checks.coefficients("drive", self.drive),
-            "resonance": checks.resonances("resonance", self.resonance),
-            "resonance_damping": checks.damping("resonance_damping", self.resonance_damping),
-            "pose_every": checks.steps("pose_every", self.pose_every, at_least=1),
-            "pose_missing": checks.share("pose_missing", self.pose_missing),
-            "from_middle": checks.shares("from_middle", self.from_middle),
-            "arms": _arms(self.arms),
-        }
-        if not np.min(settled["gain"]) > 0.0:
-            raise InvalidInputError(f"gain: expected numbers above 0, got {shorten(self.gain)}.")
-        for name, value in settled.items():
-            object.__setattr__(self, name, value)
+    zero: Unsigned = 0.0
+    link: Number = 0.0
+    axis: Number = 0.0
+    payload: Signed = 0.0
+    payload_step: Steps = 0
+    arms: Annotated[Sequence[Arm], _arms] = ()
+    calibration: Ranged = 1.0
+    load: Ranged = 1.0
+    bandwidth: Annotated[Drawn | PerJoint, checks.frequency] = math.inf
+    command_delay: Annotated[PerJoint | tuple[int, int], checks.delay] = 0
+    delay_margin: Number = 0.0
+    drive: Annotated[tuple[tuple[float, ...], ...] | tuple[float, ...], checks.coefficients] = ()
+    gain: Annotated[PerJoint, checks.positive] = 1.0
+    resonance: Annotated[PerJoint, checks.resonances] = math.inf
+    resonance_damping: Annotated[PerJoint, functools.partial(checks.positive, below=1.0)] = 0.05
+    backlash: Unsigned = 0.0
+    bias: Signed = 0.0
+    noise: Unsigned = 0.0
+    q_noise: Unsigned = 0.0
+    pose_noise: Ranged = 0.0
+    pose_rotation_noise: Ranged = 0.0
+    q_delay: Steps = 0
+    pose_delay: Steps = 0
+    pose_every: Annotated[int | tuple[int, int], functools.partial(checks.steps, at_least=1)] = 1
+    pose_missing: Annotated[float, Bounds(at_least=0.0, at_most=1.0)] = 0.0
+    from_middle: Annotated[tuple[float, float], checks.shares] = (0.0, 1.0)
 
     def __repr__(self) -> str:
         values = {**self.switched_on(), **({"arms": [one.name for one in self.arms]} if self.arms else {})}
@@ -175,8 +164,16 @@ class Plant(Frozen):
             raise InvalidInputError(f"scaled: expected a plant without arms or drives of low order, got {self}.")
         known = number("knowledge", knowledge, at_least=0.0, at_most=LARGEST)
         driven = known if drives is None else number("drives", drives, at_least=0.0, at_most=LARGEST)
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return self.replace(**severity.knowledge(values, known), **severity.drives(values, driven))
+        changes: dict[str, Any] = {name: scale(getattr(self, name), known) for name in KNOWLEDGE}
+        changes |= {name: round(known * getattr(self, name)) for name in DELAYS}
+        changes |= {"pose_every": whole(self.pose_every, known, 1), "payload_step": self.payload_step if known else 0}
+        changes |= {name: scale(getattr(self, name), driven) for name in DRIVES}
+        if driven == 0.0:
+            changes |= {"command_delay": 0, "bandwidth": math.inf, "resonance": math.inf, "gain": 1.0}
+        else:
+            changes |= {name: scale(getattr(self, name), 1.0 / driven) for name in ("bandwidth", "resonance")}
+            changes |= {"command_delay": whole(self.command_delay, driven), "gain": scale(self.gain, driven, 1.0)}
+        return self.replace(**changes)
 
     def at_margin(self) -> Self:
         """The plant whose commands come later by `delay_margin`; by whole steps where the delay is drawn."""
@@ -229,7 +226,7 @@ class Plant(Frozen):
         """Whether all effects are off."""
         swings = np.min(self.bandwidth) < math.inf or np.min(self.resonance) < math.inf
         driven = swings or bool(self.drive) or self.longest_command_delay > 0 or np.any(np.not_equal(self.gain, 1.0))
-        others = *(name for name in JOINT_WISE if name != "gain"), *SCALARS, "pose_noise", "pose_rotation_noise"
+        others = *(name for name in JOINT_WISE if name != "gain"), *KNOWLEDGE
         return not (self.arms or driven or self.late or self._on(*others))
 
     @property
@@ -294,7 +291,20 @@ class Plant(Frozen):
         return any(np.any(getattr(self, name)) for name in names)
 
 
-def _arms(given: Any) -> tuple[Arm, ...]:
-    if not isinstance(given, (tuple, list)) or not all(isinstance(one, Arm) for one in given):
-        raise InvalidInputError(f"arms: expected a sequence of arms, got {shorten(given)}.")
-    return tuple(given)
+def whole(value: Any, factor: float, least: int = 0) -> Any:
+    """A whole number, or each of a tuple of them, with its excess over the least one times a factor, rounded.
+
+    Numbers with a fraction stay unrounded, as do those next to them.
+    """
+    if np.any(np.mod(value, 1.0)):
+        return scale(value, factor, least)
+    if isinstance(value, tuple):
+        return tuple(whole(part, factor, least) for part in value)
+    return least + round(factor * (value - least))
+
+
+def scale(value: Any, factor: float, middle: float = 0.0) -> Any:
+    """A number, or a tuple of numbers, with its difference from the middle times a factor."""
+    if isinstance(value, tuple):
+        return tuple(float(part) for part in middle + factor * (np.array(value) - middle))
+    return middle + factor * (value - middle)
