@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,10 +13,7 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError
 from ikgym.frozen import Frozen
 from ikgym.scenarios import Scenario
-from ikgym.validation import LARGEST, SMALLEST, flag, float_array, number, shorten, whole_number
-
-#: Most observations that are shown side by side.
-MOST_HISTORY = 1000
+from ikgym.validation import LARGEST, Bounds, Flag, Positive, float_array, shorten
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,32 +73,21 @@ squares of the model, as shares of the largest |
         InvalidInputError: A value is refused.
     """
 
-    scenario: str | Scenario = "learning-track"
+    scenario: str | os.PathLike[str] | Scenario = "learning-track"
     ahead: tuple[float, ...] = (0.01, 0.05)
     lost_distance: float | None = 0.1
-    history: int = 1
+    history: Annotated[int, Bounds(at_least=1, at_most=1000)] = 1
     commands: int = 0
-    share: float = 0.8
-    radian: float = 1.0
-    half: float = 0.025
-    steepness: float = 2.0
-    coarse: float = 0.03
-    fine: float = 0.01
-    counted: int | None = None
-    progress: float = 0.0
-    inverse: bool = False
-    context: bool = False
-
-    def __post_init__(self) -> None:
-        whole_number("history", self.history, at_least=1, at_most=MOST_HISTORY)
-        if self.counted is not None:
-            whole_number("counted", self.counted, at_least=1)
-        number("steepness", self.steepness, at_least=0.1, at_most=2.0)
-        number("progress", self.progress, at_least=0.0, at_most=LARGEST)
-        flag("inverse", self.inverse)
-        flag("context", self.context)
-        for name in ("share", "radian", "half", "coarse", "fine"):
-            number(name, getattr(self, name), at_least=SMALLEST, at_most=LARGEST)
+    share: Positive = 0.8
+    radian: Positive = 1.0
+    half: Positive = 0.025
+    steepness: Annotated[float, Bounds(at_least=0.1, at_most=2.0)] = 2.0
+    coarse: Positive = 0.03
+    fine: Positive = 0.01
+    counted: Annotated[int, Bounds(at_least=1)] | None = None
+    progress: Annotated[float, Bounds(at_least=0.0, at_most=LARGEST)] = 0.0
+    inverse: Flag = False
+    context: Flag = False
 
     def arguments(self) -> dict[str, Any]:
         """Arguments of :class:`ikgym.RedundantIKEnv`, single or vector.
