@@ -188,17 +188,6 @@ class Policy(Protocol):
         """Diagnostics of the call that returned a state, by name."""
 
 
-class Stage(Protocol):
-    """Where a policy plays: arms in the simulator, or an environment."""
-
-    @property
-    def seen(self) -> Any:
-        """The observation."""
-
-    def step(self, action: npt.NDArray[Any]) -> Outcome:
-        """Makes one step; a later one does not change its outcome."""
-
-
 class Simulation:
     """Arms side by side in the simulator, from their reset on.
 
@@ -271,7 +260,6 @@ def rollouts(
     timed: bool = False,
     tick: Tick | None = None,
     in_a_row: int = 1,
-    begin: Callable[..., Stage] = Simulation,
 ) -> list[Episode]:
     """Plays episodes, with one call of the policy for all of them in each step where that is possible.
 
@@ -289,7 +277,6 @@ def rollouts(
         in_a_row: Number of episodes that follow one another, so that the policy keeps its state: it can use in later
             ones the arm that it has learned. `predict` receives `episode_start` where the next one begins; memory that
             does not survive it is cleared.
-        begin: Begins episodes, with the arguments of :class:`Simulation`.
 
     Raises:
         InvalidInputError: The preview is invalid or shorter than the policy needs; an action is not finite or has a
@@ -302,12 +289,12 @@ def rollouts(
     for group in [[chain] for chain in chains] if single else [chains]:
         state, played = None, []
         for together in zip(*group, strict=True):
-            stage, record = begin(scenario, together, single=single, **shown), Recording(scenario, together)
+            arms, record = Simulation(scenario, together, single=single, **shown), Recording(scenario, together)
             # A policy without a state knows that an episode begins.
             start: dict[str, Any] = {} if state is None else {"episode_start": np.ones(len(together), dtype=np.bool_)}
             with _no_garbage_collection():
                 for step in range(scenario.steps):
-                    seen = stage.seen
+                    seen = arms.seen
                     if step == 0:
                         # Compilation, caches and first touch of memory belong to no step: one call does not count.
                         policy.predict(copy.deepcopy(seen))
@@ -315,7 +302,7 @@ def rollouts(
                     action, state = policy.predict(seen, state, **({} if step else start))
                     after = time.perf_counter_ns()
                     check_finite(action, policy, scenario, together, step)
-                    record.keep(step, stage.step(action), policy.report(state), policy.diagnostics(state))
+                    record.keep(step, arms.step(action), policy.report(state), policy.diagnostics(state))
                     if timed:
                         record.time_ns.append(after - before)
                     if tick is not None and (step + 1) % TICK == 0:

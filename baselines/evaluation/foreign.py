@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Seeds, Simulation
+from baselines.episodes import Episode, Policy, Recording, Seeds, Simulation, Tick, check_finite
 from baselines.policy import Report
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.simulation import Outcome
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
 from ikgym.validation import FloatArray
@@ -44,7 +45,6 @@ class ForeignPolicy:
     preview: Preview
     commands: ClassVar[int] = 0
     batched: ClassVar[bool] = False
-    wrap: Wrap | None = None
     parameters: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def predict(self, observation: Any, state: Any = None, episode_start: Any = None) -> tuple[npt.NDArray[Any], Any]:
@@ -72,78 +72,74 @@ class ForeignPolicy:
         del state
         return {}
 
-    def misfit(self, scenario: Scenario) -> str | None:
+    def misfit(self, scenario: Scenario, wrap: Wrap | None) -> str | None:
         """Why the spaces of the model do not fit a scenario; None if they do, or if it has none."""
-        env = self.environment(scenario)
-        shown, needed = env.observation_space, env.action_space
-        for kind, attribute, there in (
-            ("observations", "observation_space", shown),
-            ("actions", "action_space", needed),
-        ):
-            space = getattr(self.model, attribute, None)
+        env = make_env(scenario, self.preview, wrap)
+        for kind in ("observation", "action"):
+            space, there = getattr(self.model, f"{kind}_space", None), getattr(env, f"{kind}_space")
             if isinstance(space, gym.Space) and _shapes(space) != _shapes(there):
-                return f"{self.name} has {kind} of the shape {_shapes(space)}, the environment of {_shapes(there)}."
+                return f"{self.name} has {kind}s of the shape {_shapes(space)}, the environment of {_shapes(there)}."
         return None
 
-    def environment(self, scenario: Scenario) -> gym.Env[Any, Any]:
-        """The environment in its wrappers."""
-        bare = gym.make("RedundantIK-v0", scenario=scenario, preview=self.preview, disable_env_checker=True)
-        try:
-            env = self.wrap(bare) if self.wrap else bare
-        except Exception as e:  # whatever the user's code raises
-            raise InvalidInputError(f"wrap: raised {type(e).__name__} on {scenario.name}: {e}.") from e
-        if not isinstance(env, gym.Env) or env.unwrapped is not bare.unwrapped:
-            raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
-        return env
+
+def make_env(scenario: Scenario, preview: Preview, wrap: Wrap | None) -> gym.Env[Any, Any]:
+    """The environment of a scenario in its wrappers."""
+    bare = gym.make("RedundantIK-v0", scenario=scenario, preview=preview, disable_env_checker=True)
+    try:
+        env = wrap(bare) if wrap else bare
+    except Exception as e:  # whatever the user's code raises
+        raise InvalidInputError(f"wrap: raised {type(e).__name__} on {scenario.name}: {e}.") from e
+    if not isinstance(env, gym.Env) or env.unwrapped is not bare.unwrapped:
+        raise InvalidInputError(f"wrap: expected the environment that it was given in wrappers, got {env!r}.")
+    return env
 
 
-class WrappedEnvironment:
-    """An episode in a wrapped environment; outcomes are those of the environment inside.
-
-    Seeds other than the reset seed cannot be passed through wrappers.
-
-    Args:
-        policy: A policy that is played in wrappers.
-        scenario: The scenario.
-        seeds: The seeds of one episode.
-        **options: Those of :class:`baselines.episodes.Simulation`.
+def play_wrapped(
+    scenario: Scenario, policy: Policy, wrap: Wrap, seeds: Seeds, *, timed: bool, tick: Tick | None = None
+) -> Episode:
+    """Plays one episode in a wrapped environment; its record is that of the environment inside.
 
     Raises:
-        InvalidInputError: The episode has other seeds; a wrapper raises, or changes the episode.
+        InvalidInputError: The episode has a seed besides the reset seed, which wrappers do not pass on; a wrapper
+            raises, or changes the episode; an action is not finite.
     """
+    seed, state, record = seeds.seed, None, Recording(scenario, [seeds])
+    if seeds != Seeds(seed):
+        raise InvalidInputError(
+            f"wrap: expected an episode that has no seed but the reset seed, got {seeds}; sequences of episodes are "
+            "played without wrappers."
+        )
 
-    def __init__(self, policy: Any, scenario: Scenario, seeds: Sequence[int | Seeds], **options: Any) -> None:
-        self._seeds = Seeds.of(seeds[0])
-        if self._seeds != Seeds(self._seeds.seed):
-            raise InvalidInputError(
-                f"wrap: expected an episode that has no seed but the reset seed, got {self._seeds}; sequences of "
-                "episodes are played without wrappers."
-            )
-        self._scenario, self._steps = scenario, 0
-        self._env: gym.Env[Any, Any] = policy.environment(scenario)
-        self._arm: Simulator = self._env.unwrapped.simulator
-        self.seen, _ = self._env.reset(seed=self._seeds.seed)
-        start = Simulation(scenario, seeds, preview=1, single=True).true_q
-        self._check(self._env.np_random_seed == self._seeds.seed and np.array_equal(self._arm.true_q, start))
-
-    def step(self, action: npt.NDArray[Any]) -> Outcome:
-        """Makes one step."""
-        self.seen, _, terminated, truncated, _ = self._env.step(action)
-        self._steps, out = self._steps + 1, self._arm.outcome
-        self._check(int(out.remaining[0, 0]) == self._scenario.steps - self._steps)
-        if (terminated or truncated) and self._steps < self._scenario.steps:
-            raise InvalidInputError(
-                f"wrap: the episode of {self._scenario.name} ended after {self._steps} of {self._scenario.steps} steps."
-            )
-        return out
-
-    def _check(self, same: bool) -> None:
+    def check(same: bool) -> None:
         if not same:
             raise InvalidInputError(
-                f"wrap: expected the episode of {self._scenario.name} with seed {self._seeds.seed} from its start, got "
-                "another one: a wrapper resets without the seed, with options or during the episode, or its step does "
-                "not make one step."
+                f"wrap: expected the episode of {scenario.name} with seed {seed} from its start, got another one: a "
+                "wrapper resets without the seed, with options or during the episode, or its step does not make one "
+                "step."
             )
+
+    env = make_env(scenario, policy.preview, wrap)
+    arm: Simulator = env.unwrapped.simulator  # type: ignore[attr-defined]  # make_env has checked the class
+    seen, _ = env.reset(seed=seed)
+    start = Simulation(scenario, [seeds], preview=1, single=True).true_q
+    check(env.np_random_seed == seed and np.array_equal(arm.true_q, start))
+    policy.predict(copy.deepcopy(seen))  # does not count, see baselines.episodes.rollouts
+    for step in range(scenario.steps):
+        before = time.perf_counter_ns()
+        action, state = policy.predict(seen, state)
+        record.time_ns += [time.perf_counter_ns() - before] * timed
+        check_finite(action, policy, scenario, [seeds], step)
+        seen, _, terminated, truncated, _ = env.step(action)
+        left = scenario.steps - step - 1
+        check(arm.outcome.remaining[0, 0] == left)
+        if left and (terminated or truncated):
+            raise InvalidInputError(
+                f"wrap: the episode of {scenario.name} ended after {step + 1} of {scenario.steps} steps."
+            )
+        record.keep(step, arm.outcome, policy.report(state), policy.diagnostics(state))
+    if tick is not None:
+        tick(scenario.steps)
+    return record.episodes()[0]
 
 
 def _shapes(space: gym.Space[Any]) -> Any:

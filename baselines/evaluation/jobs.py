@@ -7,7 +7,7 @@ import itertools
 import pathlib
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -32,6 +32,9 @@ from ikgym.frozen import Frozen
 from ikgym.scenarios import Preview, Scenario
 from ikgym.scenarios.preview import offsets
 from ikgym.validation import Bounds
+
+if TYPE_CHECKING:
+    from baselines.workers import Workers
 
 #: The scenario whose plant is at this severity, of the worst one that its map shows.
 FIELD, SEVERITY = "panda-field", 0.5
@@ -101,6 +104,8 @@ class Options(Frozen):
     worst one, and 0 an ideal one."""
     progress: Annotated[bool, tyro.conf.Fixed, tyro.conf.Suppress] = False
     """Show a progress bar on stderr."""
+    command: Annotated[str, tyro.conf.Fixed, tyro.conf.Suppress] = "baselines.evaluate.evaluate(…)"
+    """The command that README.md and the report state."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,10 +122,16 @@ class Options(Frozen):
                 raise InvalidInputError("export: expected a folder for the files, `out` or --out; got none.")
         if self.preview is not None:
             offsets(self.preview)
-        if (self.workers, self.cluster) != (1, None):
-            from baselines.workers import Workers
+        _ = self.pool  # checks workers and cluster
 
-            Workers(self.workers, self.cluster)  # checks them
+    @property
+    def pool(self) -> Workers | None:
+        """The workers; None where this process plays all episodes."""
+        if (self.workers, self.cluster) == (1, None):
+            return None
+        from baselines.workers import Workers
+
+        return Workers(self.workers, self.cluster)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -102,8 +102,8 @@ class Specification:
         known = getattr(model, "parameters", None)
         parameters = self.chosen or (known if isinstance(known, Mapping) else {})
         shown = self._preview(model, preview)
-        policy = ForeignPolicy(self.name, cast("Predictor", model), shown, self.wrap, jsonable(parameters))
-        if reason := policy.misfit(scenario):
+        policy = ForeignPolicy(self.name, cast("Predictor", model), shown, jsonable(parameters))
+        if reason := policy.misfit(scenario, self.wrap):
             raise UnsuitedError(reason)
         return policy
 

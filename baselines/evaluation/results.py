@@ -7,12 +7,13 @@ import hashlib
 import io
 import pathlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import ikgym
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
@@ -59,22 +60,19 @@ class Results:
     Every file is replaced in one go, so that none is ever half written.
 
     Args:
-        directory: The folder; created if it does not exist.
         jobs: The jobs. Their rows are kept in this order, after other rows of the folder.
-        machine: Processor and versions, see :func:`baselines.evaluation.metrics.describe`.
-        options: Options of the evaluation: resume, overwrite, export and accelerations.
+        options: Options of the evaluation. The folder, `out`, is created if it does not exist.
 
     Raises:
         ResultsError: The folder cannot be written; it has results and neither `resume` nor `overwrite` is given; its
             results are damaged or cannot be compared with new ones.
     """
 
-    def __init__(
-        self, directory: pathlib.Path, jobs: Sequence[Job], machine: Mapping[str, Any], options: Options
-    ) -> None:
+    def __init__(self, jobs: Sequence[Job], options: Options) -> None:
         #: Motions that could not be exported, with the reason.
         self.not_exported: list[Skipped] = []
-        self.directory, self._file = directory, directory / "results.json"
+        self.directory = directory = pathlib.Path(options.out or "")
+        self._file = directory / "results.json"
         self._order = dict.fromkeys(job.key for job in jobs)
         self._export, self._accelerations = [FORMATS[name] for name in options.export], options.accelerations
         if options.resume and (unclear := [job.policy for job in jobs if not job.specification.identifiable]):
@@ -89,7 +87,7 @@ class Results:
                 if one.is_symlink():  # files behind it belong to somebody else
                     raise ResultsError(f"{one} is a link to another folder: remove the link.")
         self._rows = {row.key: row for row in read_rows(self._file)} if resumed else {}
-        _check_comparable(self._file, list(self._rows.values()), jobs, machine)
+        _check_comparable(self._file, list(self._rows.values()), jobs)
         for file, row in {self.series_file(row): row for row in self._rows.values()}.items():
             if file.exists():
                 self.series(row)  # a damaged log is refused before anything is played
@@ -200,12 +198,13 @@ def slug(name: str) -> str:
     return name if safe == name else f"{safe}-{hashlib.sha256(name.encode(errors='replace')).hexdigest()[:8]}"
 
 
-def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], machine: Mapping[str, Any]) -> None:
+def _check_comparable(file: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job]) -> None:
     """Refuses to mix rows that cannot be compared."""
     by_scenario = {job.scenario.name: job for job in jobs} if rows else {}
     previews = {(job.scenario.name, job.policy, canonical(job.parameters)): furthest(job.preview) for job in jobs}
     for row in rows:
-        there, here = {"version of ikgym": row.machine.get("ikgym")}, {"version of ikgym": machine["ikgym"]}
+        there: dict[str, Any] = {"version of ikgym": row.machine.get("ikgym")}
+        here: dict[str, Any] = {"version of ikgym": ikgym.__version__}
         if (job := by_scenario.get(row.scenario)) is not None:
             there |= {"steps": row.steps, "fingerprint": row.fingerprint, "test set": row.test_set}
             here |= {"steps": job.scenario.steps, "fingerprint": job.fingerprint, "test set": job.test_set}

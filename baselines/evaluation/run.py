@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import functools
 import itertools
 import sys
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
@@ -17,7 +16,7 @@ from tqdm.contrib.logging import logging_redirect_tqdm
 import ikgym
 from baselines.episodes import Episode, Tick, rollouts
 from baselines.evaluation.jobs import Job, Options, plan
-from baselines.evaluation.metrics import Row, Rows, Skipped, describe, measure
+from baselines.evaluation.metrics import Row, Rows, describe, measure
 from baselines.evaluation.policies import ALL, AnyPolicy, check_picklable
 from baselines.files import canonical, jsonable, locked
 from baselines.fingerprints import fingerprint
@@ -30,8 +29,6 @@ from ikgym.scenarios import Scenario
 from ikgym.scenarios.preview import furthest
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from baselines.evaluation.results import Results
     from baselines.workers import Workers
 
@@ -68,8 +65,8 @@ def evaluate(
             :class:`baselines.SolverPolicy` is called for one arm at a time, and once more before the first step, which
             does not count.
         **options: Fields of :class:`baselines.evaluation.jobs.Options`: test_sets, episodes, split, steps, preview,
-            wrap, timed, workers, cluster, out, resume, overwrite, report, export, noise_seeds, pairs, leaderboard,
-            severities, progress.
+            wrap, timed, workers, cluster, out, resume, overwrite, report, export, accelerations, noise_seeds, pairs,
+            leaderboard, severities, progress, command.
             More than one of `workers` needs a main module that may be imported, that is with
             ``if __name__ == "__main__":``.
 
@@ -89,48 +86,35 @@ def evaluate(
         ClusterError: There is no cluster.
         MissingDependencyError: The package of the cluster is not installed.
     """
-    return carry_out(Options(scenarios=scenarios, policies=policies, **options))
-
-
-def carry_out(
-    options: Options,
-    *,
-    command: str = "baselines.evaluate.evaluate(…)",
-    show: Callable[[pd.DataFrame, Sequence[Skipped]], None] | None = None,
-) -> Rows:
-    """See :func:`evaluate`. The files state the command; `show` is called with the lines of the table and `skipped`."""
-    jobs, skipped = plan(options)
-    workers, results = None, None
-    if (options.workers, options.cluster) != (1, None):
-        from baselines.workers import Workers
-
-        workers = Workers(options.workers, options.cluster)
+    given = Options(scenarios=scenarios, policies=policies, **options)
+    jobs, skipped = plan(given)
+    if (workers := given.pool) is not None:
         workers.check()
-    with contextlib.nullcontext() if options.out is None else locked(options.out):
-        if options.out is not None:
+    with contextlib.nullcontext() if given.out is None else locked(given.out):
+        results = None
+        if given.out is not None:
             from baselines.evaluation.results import Results
 
-            results = Results(options.out, jobs, describe(), options)
+            results = Results(jobs, given)
         rows = {row.key: row for row in results.rows} if results else {}
         left = [job for job in jobs if not (results and results.is_done(job))]
-        with _progress(left, shown=options.progress) as bar:
-            for batch, played in _play_all(left, workers, bar):
-                rows |= {row.key: row for row, _ in played}
-                if results:
-                    results.add(batch, played)
+
+        def add(batch: Batch, played: Played) -> None:
+            rows.update((row.key, row) for row, _ in played)
+            if results:
+                results.add(batch, played)
+
+        here, away = _share(left, workers)
+        with _progress(left, shown=given.progress) as bar:
+            for batch, played in _play_away(away, workers, bar):
+                add(batch, played)
+            for batch in here:
+                _announce(bar, batch)
+                add(batch, play(batch, bar.update))
         out = Rows([rows[job.key] for job in jobs], [*skipped, *(results.not_exported if results else [])])
         if results:
             results.save()
-        if show or results:
-            from baselines.evaluation.summary import summarise  # pandas is slow to import
-
-            lines = summarise(out)
-            if show:
-                show(lines, out.skipped)
-            if results:
-                if len(results.rows) > len(out):  # the folder has others, too
-                    lines = summarise(results.rows)
-                _write_tables(results, lines, out, jobs, options, command)
+            _write_tables(results, out, jobs, given)
         return out
 
 
@@ -141,25 +125,25 @@ def play(batch: Batch, tick: Tick | None = None) -> Played:
         InvalidInputError: The policy refuses the observation, or chooses an invalid action.
     """
     first = batch[0]
-    scenario, policy = first.scenario, first.bind()
+    scenario, policy, wrap = first.scenario, first.bind(), first.specification.wrap
     # Of an arm that plays several episodes one after the other, those before a job's are played, too.
     in_a_row = 1 + max(job.before for job in batch)
     starts = dict.fromkeys(job.seeds._replace(seed=job.seeds.seed - job.before) for job in batch)
     seeds = [start._replace(seed=start.seed + k) for start in starts for k in range(in_a_row)]
-    options: dict[str, Any] = {"preview": first.preview, "timed": first.timed, "tick": tick}
-    if first.specification.wrap is not None and not isinstance(policy, SolverPolicy):
-        from baselines.evaluation.foreign import WrappedEnvironment
-
-        options["begin"] = functools.partial(WrappedEnvironment, policy)
+    options: dict[str, Any] = {"timed": first.timed, "tick": tick}
     # The matrices of one arm are too small to share out, and threads would blur the times. Environment variables
     # affect only libraries that are not loaded yet.
     with threadpool_limits(limits=1):
-        if in_a_row == 1 and getattr(policy, "free_timing", False):
+        if wrap is not None and not isinstance(policy, SolverPolicy):
+            from baselines.evaluation.foreign import play_wrapped
+
+            episodes = [play_wrapped(scenario, policy, wrap, one, **options) for one in seeds]
+        elif in_a_row == 1 and getattr(policy, "free_timing", False):
             from baselines.evaluation.motion.free_timing import play_to_end
 
-            episodes = play_to_end(scenario, policy, seeds, **options)
+            episodes = play_to_end(scenario, policy, seeds, preview=first.preview, **options)
         else:
-            episodes = rollouts(scenario, policy, seeds, in_a_row=in_a_row, **options)
+            episodes = rollouts(scenario, policy, seeds, preview=first.preview, in_a_row=in_a_row, **options)
     played = dict(zip(seeds, episodes, strict=True))
     about: dict[str, Any] = {"machine": describe(), "preview": furthest(first.preview), "test_set": first.test_set}
     about |= {"fingerprint": first.fingerprint, "ideal": fingerprint(ideal(scenario))}
@@ -185,32 +169,26 @@ def batches(jobs: Iterable[Job], most: int = MOST) -> list[Batch]:
     return out
 
 
-def _play_all(jobs: Sequence[Job], workers: Workers | None, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
-    """Plays all jobs, by workers where there are some, and yields each batch as soon as it is finished.
-
-    On a cluster nothing is timed: timed jobs are played here, after the others.
-    """
-    away, here = list[Batch](), batches(jobs)
+def _share(jobs: Sequence[Job], workers: Workers | None) -> tuple[list[Batch], list[Batch]]:
+    """Batches that are played here, and by workers; on a cluster nothing is timed."""
     if workers is not None and workers.cluster is not None:
-        away = batches((job for job in jobs if not job.timed), BLOCK)
-        here = batches(job for job in jobs if job.timed)
-    elif workers is not None and len(here) > 1:
-        away, here = here, away
-    if workers is not None and away:
-        yield from _play_away(away, workers, bar)
-    for batch in here:
-        bar.announce(batch)
-        yield batch, play(batch, bar.update)
+        return batches(job for job in jobs if job.timed), batches((job for job in jobs if not job.timed), BLOCK)
+    every = batches(jobs)
+    return (every, []) if workers is None or len(every) == 1 else ([], every)
 
 
-def _play_away(away: Sequence[Batch], workers: Workers, bar: _Bar) -> Generator[tuple[Batch, Played], None, None]:
-    """Plays batches by workers."""
+def _play_away(
+    away: Sequence[Batch], workers: Workers | None, bar: tqdm[Any]
+) -> Generator[tuple[Batch, Played], None, None]:
+    """Plays batches by workers, and yields each as soon as it is finished."""
+    if workers is None or not away:
+        return
     from baselines.workers import WorkerError, run_units
 
     check_picklable({batch[0].specification: None for batch in away})
     with contextlib.closing(run_units(play, away, workers)) as all_done:
         for batch, future in all_done:
-            bar.announce(batch)
+            _announce(bar, batch)
             bar.update(sum(job.scenario.steps for job in batch))
             try:
                 played = future.result()
@@ -225,60 +203,44 @@ def _play_away(away: Sequence[Batch], workers: Workers, bar: _Bar) -> Generator[
 
 def _check_versions(batch: Batch, played: Played) -> None:
     """Refuses results of a worker with another version of the code, such as a node of a cluster may have."""
-    from baselines.workers import WorkerError
-
     expected = [(job.key, job.fingerprint, ikgym.__version__) for job in batch]
     if [(row.key, row.fingerprint, row.machine.get("ikgym")) for row, _ in played] != expected:
+        from baselines.workers import WorkerError
+
         raise WorkerError(
             f"{batch[0].policy} in {batch[0].scenario.name}: a worker returned results of another job or version. It "
             f"has ikgym {played[0][0].machine.get('ikgym')}, here is {ikgym.__version__}. Install one on all nodes."
         )
 
 
-class _Bar(tqdm):  # type: ignore[misc]  # tqdm has no types
-    """A progress bar that counts steps, and names the batch which is played and the number of its last episode."""
-
-    number, begun = 0, 0
-
-    def announce(self, batch: Batch) -> None:
-        """Names a batch."""
-        self.begun += len(batch)
-        name = printable(f"{batch[0].scenario.name} · {batch[0].policy}")
-        self.set_description(f"{name} ({self.begun}/{self.number})", refresh=False)
+def _announce(bar: tqdm[Any], batch: Batch) -> None:
+    bar.set_description(printable(f"{batch[0].scenario.name} · {batch[0].policy}"), refresh=False)
 
 
 @contextlib.contextmanager
-def _progress(jobs: Sequence[Job], *, shown: bool) -> Iterator[_Bar]:
-    """A progress bar on stderr."""
-    bar = _Bar(
-        total=sum(job.scenario.steps for job in jobs),
-        disable=not shown or not jobs,
-        file=sys.stderr,
-        unit="step",
-        unit_scale=True,
-        dynamic_ncols=True,
-        # A log file has no cursor to go back with.
-        mininterval=0.1 if sys.stderr.isatty() else 10.0,
-    )
-    bar.number = len(jobs)
-    # Messages, such as those on compilation, are printed above the bar.
-    with bar, contextlib.nullcontext() if bar.disable else logging_redirect_tqdm([logger]):
+def _progress(jobs: Sequence[Job], *, shown: bool) -> Iterator[tqdm[Any]]:
+    """A progress bar on stderr that counts steps; messages, such as those on compilation, are printed above it."""
+    # A log file has no cursor to go back with.
+    look = {"file": sys.stderr, "dynamic_ncols": True, "mininterval": 0.1 if sys.stderr.isatty() else 10.0}
+    total, hidden = sum(job.scenario.steps for job in jobs), not shown or not jobs
+    above = contextlib.nullcontext() if hidden else logging_redirect_tqdm([logger])
+    with tqdm(total=total, disable=hidden, unit="step", unit_scale=True, **look) as bar, above:
         yield bar
 
 
-def _write_tables(
-    results: Results, lines: pd.DataFrame, rows: Rows, jobs: Sequence[Job], options: Options, command: str
-) -> None:
-    """Writes tables and the report."""
+def _write_tables(results: Results, rows: Rows, jobs: Sequence[Job], options: Options) -> None:
+    """Writes tables and the report, of all rows in the folder."""
     from baselines.evaluation import report
     from baselines.evaluation.results import PAGE
+    from baselines.evaluation.summary import summarise
 
-    now = datetime.datetime.now(datetime.UTC)
-    results.write("README.md", report.readme(lines, rows.skipped, command=command, date=now).encode())
+    lines = summarise(results.rows)
+    about: dict[str, Any] = {"command": options.command, "date": datetime.datetime.now(datetime.UTC)}
+    results.write("README.md", report.readme(lines, rows.skipped, **about).encode())
     if options.report:
         from baselines.evaluation.html.page import page
 
-        results.write(PAGE, page(results, lines, rows.skipped, command=command, date=now))
+        results.write(PAGE, page(results, lines, rows.skipped, **about))
     if options.leaderboard or options.severities:
         from baselines.evaluation.rankings import write_map, write_ranking
 

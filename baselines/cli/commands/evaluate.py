@@ -6,8 +6,8 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable, Iterable
+from typing import Annotated
 
 import tyro
 
@@ -16,13 +16,10 @@ from baselines.cli import shell
 from baselines.cli.parsing import Rule, varies
 from baselines.evaluation import test_sets
 from baselines.evaluation.jobs import Options
-from baselines.evaluation.metrics import Row, Skipped
-from baselines.evaluation.run import carry_out
+from baselines.evaluation.metrics import Row
+from baselines.evaluation.run import evaluate
 from ikgym import scenarios
 from ikgym.scenarios import Scenario
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -130,17 +127,14 @@ def cut_off(played: Iterable[Scenario]) -> list[str]:
     ]
 
 
-def _show(lines: pd.DataFrame, skipped: Sequence[Skipped]) -> None:
-    """Prints the table."""
-    from baselines.evaluation import report  # pandas is slow to import
-
-    print(report.table(lines, skipped, width=shell.width()), flush=True)
-
-
 def _work(given: Arguments, command: str) -> None:
     for warning in cut_off(given.all_scenarios()) if given.steps is None else ():
         print(warning, file=sys.stderr)
-    carry_out(dataclasses.replace(given, progress=True), command=command, show=_show)
+    rows = evaluate(**vars(given) | {"progress": True, "command": command})
+    from baselines.evaluation import report  # pandas is slow to import
+    from baselines.evaluation.summary import summarise
+
+    print(report.table(summarise(rows), rows.skipped, width=shell.width()))
     if given.out is not None:
         for name in ["table.md"] * given.leaderboard + ["map.md"] * bool(given.severities):
             print(f"\n{(given.out / name).read_text(encoding='utf-8')}", end="")

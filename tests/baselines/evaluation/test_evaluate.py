@@ -187,7 +187,7 @@ def test_series_are_the_trajectory_log_of_the_first_episode_at_the_steps_that_co
     held = ikgym.scenarios.get("khan8-q7q8")
     (row,) = evaluate(held, "dls", steps=620, out=tmp_path)
     plan = planned(held, "dls", steps=620)
-    series = Results(tmp_path, plan.jobs, describe(), Options(resume=True)).series(row)
+    series = Results(plan.jobs, Options(out=tmp_path, resume=True)).series(row)
     counted = np.flatnonzero(plan.jobs[0].scenario.counted())
     assert len(counted) == 12
     np.testing.assert_allclose(series["time"], counted * held.dt)

@@ -26,7 +26,7 @@ DATE = datetime.datetime(2026, 1, 2, 3, 4, tzinfo=datetime.UTC)
 
 
 def results_of(folder):
-    return Results(folder, [], describe(), Options(resume=True))
+    return Results([], Options(out=folder, resume=True))
 
 
 def data_of(text):
