@@ -139,9 +139,11 @@ def only_tip(tree: Tree, base: str) -> str:
         return frames[0].link
     links = xml.listing([tip.link for tip in found])
     if len(leaves) == 1:
+        name = leaves[0].joints[-1]
+        [joint] = [joint for joint in tree.path(base, leaves[0].link) if joint.get("name") == name]
+        before = xml.find_required("", joint, "parent").get("link")
         raise InvalidInputError(
-            f"expected a tip, since joint {leaves[0].joints[-1]!r} of the only one seems to belong to a gripper: "
-            f"{links}, or the link before that joint."
+            f"expected a tip, since joint {name!r} seems to belong to a gripper: {before!r}, the link before it, or {links}."
         )
     raise InvalidInputError(f"expected a tip, since there are several: {links}.")
 
