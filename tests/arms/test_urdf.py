@@ -178,7 +178,9 @@ def test_the_only_tool_frame_is_the_tip_leaf_or_not(write):
 
 def test_no_arm_ends_at_a_finger_unless_it_is_asked_for(write, caplog):
     path = write(robot(joint("j1", "a", "b"), joint("gripper", "b", "c", "prismatic")))
-    with pytest.raises(InvalidInputError, match=r"joint 'gripper' seems to belong to a gripper: 'b', the link before it, or 'c'"):
+    with pytest.raises(
+        InvalidInputError, match=r"joint 'gripper' seems to belong to a gripper: 'b', the link before it, or 'c'"
+    ):
         from_urdf(path)
     assert from_urdf(path, tip="c").joints == 2
     assert "the last joint of the arm, 'gripper', seems to belong to a gripper" in caplog.text

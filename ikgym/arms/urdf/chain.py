@@ -143,7 +143,8 @@ def only_tip(tree: Tree, base: str) -> str:
         [joint] = [joint for joint in tree.path(base, leaves[0].link) if joint.get("name") == name]
         before = xml.find_required("", joint, "parent").get("link")
         raise InvalidInputError(
-            f"expected a tip, since joint {name!r} seems to belong to a gripper: {before!r}, the link before it, or {links}."
+            f"expected a tip, since joint {name!r} seems to belong to a gripper: "
+            f"{before!r}, the link before it, or {links}."
         )
     raise InvalidInputError(f"expected a tip, since there are several: {links}.")
 
