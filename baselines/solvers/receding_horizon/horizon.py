@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.policy_kernels import Model
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner, kernel
@@ -144,7 +145,7 @@ def analytic_state_gradient(data, nominal, q, qdot, by_q, by_qdot):
     ``q`` are the joint coordinates at the second and later grid points; all arrays have the shape (HL - 1, n).
     """
     steps, n = q.shape
-    chain, workspace = data.model.chain, gradient_workspace(data.model.kind, nominal, n)
+    chain, workspace = data.model.chain, knot_workspace(data.model.kind, nominal.shape[1], n)
     rotation, position, geometric = workspace.rotation, workspace.position, workspace.geometric
     total = 0.0
     for i in range(steps):
@@ -182,34 +183,11 @@ def difference_state_gradient(data, nominal, q, qdot, delta, by_q, by_qdot):
     return total
 
 
-class _GradientWorkspace(NamedTuple):
-    """Arrays of one grid point."""
-
-    rotation: Floats
-    position: Floats
-    geometric: Floats
-    pose: Floats
-    error: Floats
-    gradient: Floats
-    jacobian: Floats
-    error_jacobian: Floats
-
-
-@inner
-def gradient_workspace(kind, nominal, n):
-    """Arrays of one grid point, for the derivatives by n joint coordinates."""
-    rotation, position, pose, error = frame_workspace(kind, nominal)
-    e = error.shape[0]
-    return _GradientWorkspace(
-        rotation, position, np.empty((6, n)), pose, error, np.empty(e), np.empty((e, n)), np.empty((e, n))
-    )
-
-
 @kernel
 def linearise(kind, nominal, workspace):
     """Task coordinates, their error and its derivative by the joint coordinates, of the frame and geometric Jacobian.
 
-    They are arrays of :func:`gradient_workspace`, changed in place.
+    They are arrays of a :class:`newton.workspace.KnotWorkspace`, changed in place.
     """
     task_kernels.coordinates(kind, workspace.rotation, workspace.position, workspace.pose)
     task_kernels.error(kind, nominal, workspace.pose, workspace.error)

@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from baselines.solvers.receding_horizon.horizon import (
     frame_workspace,
-    gradient_workspace,
     linearise,
     tracking_error,
     velocity_cost,
     velocity_gradient,
 )
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels.jit import inner, kernel
 from ikgym.kernels.kinematics import forward_and_jacobian
@@ -106,7 +106,7 @@ def analytic_task_gradient(data, nominal, x, jacobian, gradient):
     ``jacobian`` receives ∂ε/∂q, of shape (HL - 1, e, n); other arguments as above. Gives the cost.
     """
     steps, n = x.q.shape
-    workspace = gradient_workspace(data.model.kind, nominal, n)
+    workspace = knot_workspace(data.model.kind, nominal.shape[1], n)
     total = 0.0
     for i in range(steps):
         forward_and_jacobian(data.model.chain, x.q[i], workspace.rotation, workspace.position, workspace.geometric)

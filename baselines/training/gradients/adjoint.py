@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from baselines.agents.bilinear.kernels import joint_command
+from baselines.solvers.receding_horizon.newton.workspace import knot_workspace
 from ikgym.kernels import cost as cost_kernels
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.cost import P_X_INSIDE
@@ -48,26 +49,6 @@ class Gradient(NamedTuple):
     output: Floats
 
 
-class Kinematics(NamedTuple):
-    """The kinematics of the arm at one configuration, with Jacobians of the error there.
-
-    Attributes:
-        rotation: Of the tool. Shape (3, 3).
-        position: Of the tool point in [m]. Shape (3,).
-        pose: Task coordinates. Shape (m,).
-        geometric: Geometric Jacobian. Shape (6, n).
-        task_jacobian: That of :func:`ikgym.kernels.tasks.jacobian`, in its first rows. Shape (at least e, n).
-        jacobian: That of :func:`ikgym.kernels.tasks.error_jacobian`. Shape (at least e, n).
-    """
-
-    rotation: Floats
-    position: Floats
-    pose: Floats
-    geometric: Floats
-    task_jacobian: Floats
-    jacobian: Floats
-
-
 @kernel
 def adjoint(model, rows, output, path, by_cost, gradient, start, stop):
     """Propagates gradients back through a segment.
@@ -90,8 +71,8 @@ def adjoint(model, rows, output, path, by_cost, gradient, start, stop):
     turned, w, of_twist = is_turned(kind, prismatic), twist_size(kind), error_kind(kind)
     e = task_kernels.error_size(kind, m)
     size = 5 if kind == task_kernels.AXIS else w
-    pose, task_jacobian, jacobian = np.empty(m), np.empty((max(e, 6), n)), np.empty((max(e, 6), n))
-    place = Kinematics(np.empty((3, 3)), np.empty(3), pose, np.empty((6, n)), task_jacobian, jacobian)
+    place = knot_workspace(kind, m, n)
+    pose = place.pose
     error, by_error, due, by_due = np.empty(max(e, 6)), np.empty(max(e, 6)), np.empty(w), np.empty(w)
     for row in range(start, stop):
         lambda_, mu, into = by_q[row], by_qdot[row], by_output[row]
@@ -127,7 +108,7 @@ def adjoint(model, rows, output, path, by_cost, gradient, start, stop):
 
 @uncounted
 def fill_kinematics(chain, kind, q, place):
-    """Fills a :class:`Kinematics` at some joint coordinates of shape (n,)."""
+    """Fills a :class:`KnotWorkspace` with frame, geometric Jacobian and pose at joint coordinates of shape (n,)."""
     forward_and_jacobian(chain, q, place.rotation, place.position, place.geometric)
     task_kernels.coordinates(kind, place.rotation, place.position, place.pose)
 
@@ -139,13 +120,13 @@ def add_error_gradient(kind, target, place, error, by_error, lambda_):
     Args:
         kind: Of task coordinates.
         target: Reference task coordinates. Shape (m,).
-        place: A :class:`Kinematics`.
+        place: A :class:`KnotWorkspace`, see :func:`fill_kinematics`.
         error: Of the task. Shape (e,).
         by_error: The gradient with respect to it. Shape (e,).
         lambda_: That with respect to the joint coordinates. Shape (n,).
     """
     e = error.shape[0]
-    task_jacobian, jacobian = place.task_jacobian[:e], place.jacobian[:e]
+    task_jacobian, jacobian = place.jacobian[:e], place.error_jacobian[:e]
     task_kernels.jacobian(kind, place.rotation, place.geometric, task_jacobian)
     task_kernels.error_jacobian(kind, target, place.pose, error, task_jacobian, jacobian)
     for a in range(e):
