@@ -13,7 +13,6 @@ from baselines.evaluate import evaluate
 from baselines.evaluation.plots import style
 from baselines.files import ResultsError
 from baselines.status import Status
-from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 STEPS = 30
 
@@ -107,20 +106,3 @@ def test_whatever_can_be_evaluated_can_be_tracked():
     assert baselines.track(scenario, baselines.make("dls", scenario), steps=3).policy == "dls"
     wrapped = baselines.track("zhang3-helix", Still(), steps=3, wrap=gym.wrappers.FlattenObservation)
     np.testing.assert_array_equal(wrapped.q, track.q[:3])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "error", "message"),
-    [
-        (("varga7-fest", "dls"), {}, UnknownNameError, "Did you mean 'varga7-fast'"),
-        (("varga7-fast", "dsl"), {}, UnknownNameError, "Did you mean 'dls'"),
-        (("varga7-fast", "dls"), {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1"),
-        (("varga7-fast", "dls"), {"seed": -1}, InvalidInputError, "seed: expected a whole number of at least 0"),
-        (("varga7-fast", "rhc_gradient"), {"preview": 1, "steps": 3}, InvalidInputError, "2 steps ahead"),
-        (("zhang3-helix", "follow_nominal"), {}, InvalidInputError, "follow_nominal does not suit zhang3-helix"),
-        (("varga7-fast", ["dls"]), {}, InvalidInputError, "policy: expected a name"),
-    ],
-)
-def test_bad_input_is_refused(arguments, options, error, message):
-    with pytest.raises(error, match=message):
-        baselines.track(*arguments, **options)
