@@ -57,6 +57,7 @@ LINE = paths.Line([0, 0, 0], [1, 2, 3])
 HELIX = Helix([0, 0, 0], 1, 1, 1)
 BODIES = Bodies(("upper", "hand"), (3, 7), [[0, 0, 0], [0, 0, -0.1]], [[0, 0, 0.1], [0, 0, -0.1]], (0.1, 0.05))
 RETIMED = RetimedTrajectory(PathTrajectory(LINE, Quintic(1, 1)), [0.0, 2.0], [0.0, 1.0], [0.0, 1.0])
+JOINT_PATH = JointPath(RETIMED, [0.0, 1.0], [[0.0] * 7, [1.0] * 7])
 BOXES = RandomBoxes("boxes", [-1, -1, 0], [1, 1, 1], [0.1, 0.1, 0.1], [0.2, 0.2, 0.2], ignored=("hand",))
 GOOD = (
     ARM,
@@ -81,7 +82,7 @@ GOOD = (
     PublishedPath("rlitg-zig", 0.2),
     RandomPublishedPath("rlitg-random-00", 0.2),
     RETIMED,
-    JointPath(RETIMED, [0.0, 1.0], [[0.0] * 7, [1.0] * 7]),
+    JOINT_PATH,
     LINE,
     paths.Circle([0, 0, 0], 0.3),
     paths.CircularHelix([0, 0, 0], 0.3, pitch=0.1),
@@ -346,6 +347,9 @@ REFUSED = [
         ("rise, got 0", "times", [0, 0]), ("0 s as the first, got 1", "times", [1, 2]), ("from 2 to", "times", [0]),
         ("never fall, got -1", "progress", [1, 0]), ("at least 0, got -1", "rates", [0, -1]),
         ("not random", "trajectory", RandomSinusoid(ONES)),
+    )),
+    *(("rise, got 0|0 s as the first|shape", lambda x=x: JOINT_PATH.replace(**x)) for x in (
+        {"times": [0.0, 0.0]}, {"times": [0.1, 1.0]}, {"q": [[0.0] * 7]},
     )),
     ("start and end", lambda: paths.Line([1, 2, 3], [1, 2, 3])),
     *(("corner_radius|at most 1 m", lambda x=x: paths.Polyline(POINTS, x)) for x in (2.0, 0.0)),

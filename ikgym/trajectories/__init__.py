@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from ikgym.trajectories import paths
 from ikgym.trajectories.batch import JointMotions, first_joints_of, frames_of, joint_paths_of
+from ikgym.trajectories.derived import JointPath, RetimedTrajectory
 from ikgym.trajectories.helix import Helix
-from ikgym.trajectories.joint_path import JointPath
 from ikgym.trajectories.joint_spline import JointSpline, RandomJointSpline
 from ikgym.trajectories.orientations import AlongPath, FixedOrientation, OrientationThrough, Turning
 from ikgym.trajectories.path_trajectory import PathTrajectory
 from ikgym.trajectories.published_path import PublishedPath, RandomPublishedPath
-from ikgym.trajectories.retimed import RetimedTrajectory
 from ikgym.trajectories.sinusoid import RandomSinusoid, Sinusoid
 from ikgym.trajectories.straight_line import StraightLine
 from ikgym.trajectories.time_laws import Quintic, TimeLaw, Trapezoidal

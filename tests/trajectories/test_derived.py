@@ -1,11 +1,9 @@
-"""A joint motion along another trajectory: the poses are those of the trajectory."""
+"""Trajectories with the poses of another one: in another time, or with a joint motion along it."""
 
 import numpy as np
-import pytest
 from scipy.interpolate import CubicSpline
 
 import ikgym
-from ikgym.exceptions import InvalidInputError
 from ikgym.trajectories import JointPath, RetimedTrajectory
 
 CIRCLE = ikgym.scenarios.get("panda-circle")
@@ -36,15 +34,12 @@ def test_files_keep_every_number(tmp_path):
     np.testing.assert_array_equal(read.times, TIMES)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"times": [0.0, 1.0, 1.0, 2.0]}, "times: expected at least two times in .s. that rise from 0"),
-        ({"times": [0.1, 1.0, 1.5, 2.0]}, "rise from 0"),
-        ({"q": Q[:3]}, "q: expected shape"),
-        ({"trajectory": ikgym.scenarios.get("panda-random").trajectory}, "not random"),
-    ],
-)
-def test_bad_input(changes, message):
-    with pytest.raises(InvalidInputError, match=message):
-        MOTION.replace(**changes)
+def test_poses_in_another_time():
+    """Rates 0, 1, 1 at 0, 2, 4 s: progress t²/4, then t - 1."""
+    slower = RetimedTrajectory(CIRCLE.trajectory, [0.0, 2.0, 4.0], [0.0, 1.0, 3.0], [0.0, 1.0, 1.0])
+    times = np.linspace(0.0, 5.0, 101)
+    expected = np.where(times < 2.0, times**2 / 4.0, np.minimum(times - 1.0, 3.0))
+    np.testing.assert_allclose(slower.base_times(times), expected, atol=1e-14)
+    poses = CIRCLE.trajectory.frames(slower.base_times(times), CIRCLE.arm)
+    np.testing.assert_array_equal(slower.frames(times, CIRCLE.arm), poses)
+    assert (slower.duration, slower.has_orientation) == (4.0, True)
