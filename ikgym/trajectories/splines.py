@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
-from ikgym.kernels.cubic_splines import solve_tridiagonal
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, IntArray
 
 # Gauss-Legendre rule for the length of a piece of a curve.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(7)
-# Pieces whose lengths are computed at a time: memory for long curves.
-_TOGETHER = 2**11
+# Pieces that are looked at together: memory for long curves.
+_TOGETHER = 2**8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,15 +44,17 @@ class CubicSpline:
         if not at_rest:
             diagonal[[0, -1]], upper[0], lower[-1] = 2.0, 1.0, 1.0
             right[[0, -1]] = 3.0 * secants[[0, -1]]
-        solve_tridiagonal(lower, diagonal, upper, right)
-        return cls(knots, values, right)
+        return cls(knots, values, _solve_tridiagonal(lower, diagonal, upper, right))
 
     def __call__(self, at: FloatArray, derivative: int = 0) -> FloatArray:
         """The curve, or its first or second derivative. ``at``: shape (...,). Returns shape (..., d)."""
         inside = np.clip(at, self.knots[0], self.knots[-1])
         i = np.clip(np.searchsorted(self.knots, inside, side="right") - 1, 0, len(self.knots) - 2)
-        h = (self.knots[i + 1] - self.knots[i])[..., None]
-        u = (inside - self.knots[i])[..., None] / h
+        return self.along_pieces(i, (inside - self.knots[i]) / (self.knots[i + 1] - self.knots[i]), derivative)
+
+    def along_pieces(self, i: IntArray, u: FloatArray, derivative: int = 0) -> FloatArray:
+        """The same at shares u of the way from knot i to the next. Shapes that broadcast to (...,), and (..., d)."""
+        h, u = (self.knots[i + 1] - self.knots[i])[..., None], u[..., None]
         secant = (self.values[i + 1] - self.values[i]) / h
         a, b = self.slopes[i], self.slopes[i + 1]
         c, d = 3.0 * secant - 2.0 * a - b, a + b - 2.0 * secant
@@ -62,6 +64,39 @@ class CubicSpline:
             return a + u * (2.0 * c + 3.0 * u * d)
         out: FloatArray = self.values[i] + h * u * (a + u * (c + u * d))
         return out
+
+    def extremes(self, samples: int) -> tuple[float, int, float]:
+        """The least speed by the parameter, the piece where it occurs, and the largest curvature of a curve in space.
+
+        Args:
+            samples: Stretches of a piece at whose ends the curve is looked at.
+        """
+        least, slowest, largest, u = math.inf, 0, 0.0, np.arange(samples + 1) / samples
+        for start in range(0, len(self.knots) - 1, _TOGETHER):
+            pieces = np.arange(start, min(start + _TOGETHER, len(self.knots) - 1))[:, None]
+            first, second = (self.along_pieces(pieces, u, derivative) for derivative in (1, 2))
+            speed, bend = (np.linalg.norm(vectors, axis=-1) for vectors in (first, np.cross(first, second)))
+            if speed.min() < least:
+                least, slowest = float(speed.min()), start + int(speed.argmin()) // (samples + 1)
+            moving = speed > 0.0
+            largest = max(largest, float((bend[moving] / (speed * speed * speed)[moving]).max(initial=0.0)))
+        return least, slowest, largest
+
+
+def _solve_tridiagonal(lower: FloatArray, diagonal: FloatArray, upper: FloatArray, right: FloatArray) -> FloatArray:
+    """Solves a diagonally dominant tridiagonal system, without pivots. Shapes (k,) and (k, d)."""
+    left, middle, columns, k = lower.tolist(), diagonal.tolist(), right.T.tolist(), len(right)
+    for i in range(1, k):
+        factor = left[i] / middle[i - 1]
+        middle[i] -= factor * upper[i - 1]
+        for column in columns:
+            column[i] -= factor * column[i - 1]
+    factors = (upper[:-1] / middle[1:]).tolist()
+    for column in columns:
+        for i in range(k - 2, -1, -1):
+            column[i] -= factors[i] * column[i + 1]
+    solution: FloatArray = np.array(columns).T / np.array(middle)[:, None]
+    return solution
 
 
 class ArcLength:

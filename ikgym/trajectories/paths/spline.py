@@ -8,7 +8,6 @@ import functools
 import numpy as np
 
 from ikgym.exceptions import InvalidInputError
-from ikgym.kernels.cubic_splines import extremes
 from ikgym.trajectories.paths.path import Path, Points
 from ikgym.trajectories.splines import ArcLength, CubicSpline
 from ikgym.validation import FloatArray
@@ -35,7 +34,7 @@ class SplinePath(Path):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        least, i, curvature = extremes(self._spline.knots, self._spline.values, self._spline.slopes, SAMPLES)
+        least, i, curvature = self._spline.extremes(SAMPLES)
         if least < LEAST_SPEED:
             raise InvalidInputError(
                 f"points: expected a curve that nowhere turns straight back, got one that does near number {i}, "
