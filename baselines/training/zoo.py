@@ -50,13 +50,13 @@ def read_settings(config: Rewards) -> dict[str, Any]:
     content = read_entries(SETTINGS / f"{config.algorithm}.yml" if config.settings is None else config.settings)
     known_name("environment in the settings", config.env, content)
     entry = content[config.env]
-    if not isinstance(entry, dict) or "n_timesteps" not in entry:
-        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {shorten(entry)}.")
     if not _is_plain(entry, LEVELS):  # run.json states them
         raise InvalidInputError(  # without the entry, which aliases may make longer than memory
             f"settings: expected texts, finite numbers, and lists and tables of these with at most {LEVELS} levels of "
             f"{ELEMENTS} elements, got others in the entry of {config.env}."
         )
+    if not isinstance(entry, dict) or "n_timesteps" not in entry:
+        raise InvalidInputError(f"settings: expected n_timesteps and others of {config.env}, got {shorten(entry)}.")
     steps = number("n_timesteps", entry["n_timesteps"], at_least=1.0)
     return {**entry, "n_timesteps": int(steps)}
 
