@@ -188,54 +188,30 @@ class Policy(Protocol):
         """Diagnostics of the call that returned a state, by name."""
 
 
-class Simulation:
-    """Arms side by side in the simulator, from their reset on.
+def begin(
+    scenario: Scenario, seeds: Sequence[int | Seeds], *, preview: Preview, single: bool = False, commands: int = 0
+) -> tuple[Simulator, Outcome]:
+    """Arms side by side at the start of their episodes, and the outcome before the first step.
 
     Args:
         scenario: The scenario.
         seeds: Seeds of the episodes, one an arm.
         preview: Steps ahead that the reference trajectory is shown, or which ones.
-        single: Whether there is one arm, and observation and action have no batch axis.
+        single: Whether there is one arm, whose actions have no batch axis.
         commands: Number of past commands that are shown.
 
     Raises:
         InvalidInputError: The preview or the number of commands is invalid, or the plant draws no arm by seed.
     """
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        seeds: Sequence[int | Seeds],
-        *,
-        preview: Preview,
-        single: bool = False,
-        commands: int = 0,
-    ) -> None:
-        drawn = [Seeds.of(seed) for seed in seeds]
-        self._row = 0 if single else None
-        self._simulator = Simulator(scenario, None if single else len(seeds), preview, commands=commands)
-        self._simulator.reset(
-            np.ones(len(seeds), dtype=np.bool_),
-            [seeding.np_random(one.seed)[0] for one in drawn],
-            noise_seeds=[one.noise_seed for one in drawn],
-            **self._simulator.check_options({"arm_seed": [one.arm_seed for one in drawn]}),
-        )
-        self._outcome = self._simulator.observe()
-
-    @property
-    def seen(self) -> Any:
-        """The observation, without a row axis of a single arm."""
-        return observation(self._outcome, self._row)
-
-    @property
-    def true_q(self) -> FloatArray:
-        """True joint coordinates, in [rad] or [m]. Shape (N, n)."""
-        return self._simulator.true_q
-
-    def step(self, action: npt.NDArray[Any]) -> Outcome:
-        """Makes one step of all arms; its outcome has arrays with a leading axis of arms."""
-        self._outcome = self._simulator.step(action)
-        return self._outcome
+    drawn = [Seeds.of(seed) for seed in seeds]
+    arms = Simulator(scenario, None if single else len(seeds), preview, commands=commands)
+    arms.reset(
+        np.ones(len(seeds), dtype=np.bool_),
+        [seeding.np_random(one.seed)[0] for one in drawn],
+        noise_seeds=[one.noise_seed for one in drawn],
+        **arms.check_options({"arm_seed": [one.arm_seed for one in drawn]}),
+    )
+    return arms, arms.observe()
 
 
 def rollout(
@@ -285,16 +261,17 @@ def rollouts(
     single = timed or not policy.batched
     shown: dict[str, Any] = {"preview": policy.preview if preview is None else preview, "commands": policy.commands}
     chains = [seeds[first : first + in_a_row] for first in range(0, len(seeds), in_a_row)]
-    out: list[Episode] = []
+    episodes: list[Episode] = []
     for group in [[chain] for chain in chains] if single else [chains]:
         state, played = None, []
         for together in zip(*group, strict=True):
-            arms, record = Simulation(scenario, together, single=single, **shown), Recording(scenario, together)
+            arms, out = begin(scenario, together, single=single, **shown)
+            record, row = Recording(scenario, together), 0 if single else None
             # A policy without a state knows that an episode begins.
             start: dict[str, Any] = {} if state is None else {"episode_start": np.ones(len(together), dtype=np.bool_)}
             with _no_garbage_collection():
                 for step in range(scenario.steps):
-                    seen = arms.seen
+                    seen = observation(out, row)
                     if step == 0:
                         # Compilation, caches and first touch of memory belong to no step: one call does not count.
                         policy.predict(copy.deepcopy(seen))
@@ -302,7 +279,8 @@ def rollouts(
                     action, state = policy.predict(seen, state, **({} if step else start))
                     after = time.perf_counter_ns()
                     check_finite(action, policy, scenario, together, step)
-                    record.keep(step, arms.step(action), policy.report(state), policy.diagnostics(state))
+                    out = arms.step(action)
+                    record.keep(step, out, policy.report(state), policy.diagnostics(state))
                     if timed:
                         record.time_ns.append(after - before)
                     if tick is not None and (step + 1) % TICK == 0:
@@ -310,8 +288,8 @@ def rollouts(
             if tick is not None:
                 tick(scenario.steps % TICK * len(together))
             played.append(record.episodes())
-        out += [episode for chain in zip(*played, strict=True) for episode in chain]
-    return out
+        episodes += [episode for chain in zip(*played, strict=True) for episode in chain]
+    return episodes
 
 
 def check_finite(

@@ -27,8 +27,7 @@ from baselines import registry
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots.comparison import front
-from baselines.evaluation.rankings import ranking
-from baselines.evaluation.summary import LOWEST
+from baselines.evaluation.summary import LOWEST, rank
 from baselines.evaluation.table import records
 from baselines.files import canonical, jsonable
 from baselines.registry import parse_policy
@@ -73,7 +72,7 @@ def _group(name: str, old: list[Line], only_new: bool) -> list[Line]:
         episodes, noise_seeds = conditions
         folder = f"{name}-{old[0]['scenario']}-{episodes}-{noise_seeds}"
         rows = evaluate(scenario, played, episodes=episodes, noise_seeds=noise_seeds, **resumable(folder))
-        for one in records(ranking(rows, list(some))):
+        for one in records(rank(rows, list(some))):
             line = some[one["policy"]]
             out.append(line | one | {"policy": line["policy"]} | (_errors(line, rows) if "error_mm" in line else {}))
     if "front" in old[0]:

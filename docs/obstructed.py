@@ -2,11 +2,12 @@
 
 `obstructed_paths.csv` has a line for each problem, and the table its sums. A line that is there is not measured
 again. The start is free: `qp` plays from up to a hundred postures at the first pose, `rhc_foresight` from the start
-of the planned path. The joint velocities of both are limited to 7° a waypoint.
+of the planned path. The joint velocities of both are limited to 7° a waypoint. :func:`verdict` is CppFlow's rule.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -15,13 +16,15 @@ import numpy as np
 
 import baselines
 from baselines.episodes import rollout
-from baselines.evaluation.motion.published_rule import TRAVEL, TURN, Verdict, verdict
 from baselines.paths import motion
 from baselines.paths.routes import Routes
 from baselines.paths.starts import solutions
 from docs.keeping import Line, keep, lines
 from ikgym import problems, scenarios
+from ikgym.kernels.rotations import geodesic_angle
 from ikgym.scenarios import Scenario
+from ikgym.trajectories import PublishedPath
+from ikgym.trajectories.orientations import matrices
 from ikgym.validation import FloatArray
 
 PATHS = "obstructed_paths"
@@ -31,6 +34,51 @@ SETS = {"RL-ITG, drawn": "rlitg-s", "RL-ITG, random": "rlitg-obstacle", "CppFlow
 POLICIES = ("planned", "qp", "rhc_foresight", "published")
 #: Steps from waypoint to waypoint, most postures from which `qp` begins, and a finer search where there is no way.
 STRIDE, STARTS, FINE = 10, 100, MappingProxyType({"cell": 0.3, "postures": 2500})
+#: Errors of the tool in [m] and [rad], and joint motions between waypoints in [rad], and in [m] of a prismatic joint,
+#: that a passed problem stays below (Morgan, Millard and Sukhatme 2024).
+POSITION, ORIENTATION, TURN, TRAVEL = 1e-4, np.radians(0.1), np.radians(7.0), 0.02
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """Errors, motions and clearance of a joint path at the waypoints of a problem."""
+
+    position: float  # largest error in [m]
+    orientation: float  # largest error in [rad]
+    turn: float  # largest motion of a revolute joint between two waypoints, in [rad]
+    travel: float  # likewise of a prismatic joint, in [m]
+    within: bool  # whether the joints are within their limits
+    clearance: float  # smallest signed distance between bodies in [m]; infinite where none can meet
+
+    @property
+    def followed(self) -> bool:
+        """Whether the tool is on the path."""
+        return self.position < POSITION and self.orientation < ORIENTATION
+
+    @property
+    def passed(self) -> bool:
+        """Whether the path is followed in small joint motions, within the limits, and without a collision."""
+        smooth = self.turn < TURN and self.travel < TRAVEL
+        return self.followed and smooth and self.within and self.clearance > 0.0
+
+
+def verdict(scenario: Scenario, q: FloatArray) -> Verdict:
+    """Judges joint coordinates (k, n) in [rad] or [m] at the waypoints of a published path, by our bodies."""
+    assert isinstance(scenario.trajectory, PublishedPath)
+    arm, (positions, quaternions, *_) = scenario.arm, problems.get(scenario.trajectory.problem)
+    rotations, there = arm.forward(q)
+    endless = np.isinf(arm.upper - arm.lower)
+    moved = np.abs(np.diff(q, axis=0))
+    moved = np.where(endless, np.abs(np.remainder(moved + np.pi, 2.0 * np.pi) - np.pi), moved)
+    sliding = arm.chain.prismatic
+    return Verdict(
+        position=float(np.linalg.norm(there - positions, axis=1).max()),
+        orientation=float(max(map(geodesic_angle, rotations, matrices(quaternions)))),
+        turn=float(moved[:, ~sliding].max()),
+        travel=float(moved[:, sliding].max(initial=0.0)),
+        within=bool(((q >= arm.lower) & (q <= arm.upper)).all()),
+        clearance=float(arm.clearance(q, scenario.obstacles)[0].min()),
+    )
 
 
 def line(name: str) -> Line:

@@ -12,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
-from baselines.episodes import Episode, Policy, Recording, Seeds, Simulation, Tick, check_finite
+from baselines.episodes import Episode, Policy, Recording, Seeds, Tick, begin, check_finite
 from baselines.policy import Report
 from baselines.status import Status
 from ikgym.exceptions import InvalidInputError
@@ -121,7 +121,7 @@ def play_wrapped(
     env = make_env(scenario, policy.preview, wrap)
     arm: Simulator = env.unwrapped.simulator  # type: ignore[attr-defined]  # make_env has checked the class
     seen, _ = env.reset(seed=seed)
-    start = Simulation(scenario, [seeds], preview=1, single=True).true_q
+    start = begin(scenario, [seeds], preview=1, single=True)[0].true_q
     check(env.np_random_seed == seed and np.array_equal(arm.true_q, start))
     policy.predict(copy.deepcopy(seen))  # does not count, see baselines.episodes.rollouts
     for step in range(scenario.steps):

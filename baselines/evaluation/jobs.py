@@ -40,9 +40,14 @@ if TYPE_CHECKING:
 FIELD, SEVERITY = "panda-field", 0.5
 
 
+def _words(metavar: str, default: str) -> Any:
+    """An option of words on the command line, and of any objects in Python."""
+    return tyro.conf.arg(constructor=tuple[str, ...], metavar=metavar, help_behavior_hint=default)
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Options(Frozen):
-    """Options of :func:`baselines.evaluate.evaluate` and of the command.
+    """Options of the command and of :func:`baselines.evaluate.evaluate`, which takes scenarios and policies as objects.
 
     Names may be given as one text or as several; `out` may be text, too.
 
@@ -51,10 +56,11 @@ class Options(Frozen):
         InvalidInputError: A number is out of range, the preview is invalid, or `export` is given without `out`.
     """
 
-    scenarios: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ()
-    """Scenarios as :func:`ikgym.scenarios.find` takes them; ``"all"`` for all registered ones."""
-    policies: Annotated[Any, tyro.conf.Fixed, tyro.conf.Suppress] = ALL
-    """Policies as :func:`baselines.evaluation.policies.specifications` takes them."""
+    scenarios: Annotated[Any, _words("NAME …", "(default: varga7-fast without test sets)")] = ()
+    """Names of scenarios, FILE.toml, MODULE:ATTRIBUTE, or: all."""
+    policies: Annotated[Any, _words("POLICY …", "(default: all)")] = (ALL,)
+    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
+    a class of yours, also of a module in the current folder, or: all."""
     test_sets: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
     """Test sets, which define the episodes, instead of scenarios, episodes, split, steps and noise seeds."""
     episodes: Annotated[int, tyro.conf.arg(metavar="N"), Bounds(at_least=1)] = 1
@@ -195,22 +201,18 @@ def plan(options: Options) -> tuple[list[Job], list[Skipped]]:
     skipped: list[Skipped] = []
     for (scenario, seeds, test_set, length), one in itertools.product(_episodes(options), policies):
         try:
-            policy = one.bind(scenario, seeds[0], options.preview)
+            first = _first_job(one, scenario, seeds[0], options.preview)
         except UnsuitedError as e:
             skipped.append(Skipped(scenario.name, one.name, str(e)))
             continue
-        parameters, shown = one.parameters(scenario, policy), shown_preview(policy, options.preview)
         per_episode = one.per_episode(scenario)
         for number, draw in enumerate(seeds):
-            job = Job(
-                scenario=scenario,
-                specification=one,
-                parameters=parameters,
+            job = dataclasses.replace(
+                first,
                 seeds=draw,
                 first=number == 0,
                 record=number == 0 or bool(options.export),
                 timed=number < timed,
-                preview=shown,
                 test_set=test_set,
                 # A reference is bound to one episode, and has nothing to learn from those before.
                 before=0 if per_episode or draw.arm_seed is None else draw.seed - draw.arm_seed * length,
@@ -229,12 +231,16 @@ def job_of(policy: AnyPolicy, scenario: Scenario, seed: int, preview: Preview | 
         UnknownNameError: There is no such policy or parameter.
         InvalidInputError: The policy does not suit the scenario, or is shown too little.
     """
-    one, seeds = specification(policy, wrap=wrap), Seeds(seed)
+    one = specification(policy, wrap=wrap)
     try:
-        bound = one.bind(scenario, seeds, preview)
+        return _first_job(one, scenario, Seeds(seed), preview)
     except UnsuitedError as e:
         raise InvalidInputError(f"{one.name} does not suit {scenario.name}: {e}") from e
-    parameters, shown = one.parameters(scenario, bound), shown_preview(bound, preview)
+
+
+def _first_job(one: Specification, scenario: Scenario, seeds: Seeds, preview: Preview | None) -> Job:
+    policy = one.bind(scenario, seeds, preview)
+    parameters, shown = one.parameters(scenario, policy), shown_preview(policy, preview)
     return Job(scenario, one, parameters, seeds, first=True, record=True, timed=True, preview=shown)
 
 

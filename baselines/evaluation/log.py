@@ -14,11 +14,6 @@ from ikgym.validation import FloatArray
 
 #: Most pictures of a replay.
 FRAMES = 400
-#: Arrays of every log.
-USUAL = (
-    *("time", "nominal", "pose", "q", "qdot", "position_error", "joint_names", "prismatic", "lower", "upper"),
-    *("velocity_limit", "frame", "joint_points", "tool", "tool_rotation"),
-)
 #: Arrays by name, see :func:`trajectory_log`.
 TrajectoryLog = dict[str, npt.NDArray[Any]]
 #: The frame of fixed objects.

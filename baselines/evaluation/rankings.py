@@ -6,9 +6,9 @@ import dataclasses
 import pathlib
 from collections.abc import Iterable, Sequence
 
-import pandas as pd
 from tqdm import tqdm
 
+from baselines.evaluation.columns import CELLS
 from baselines.evaluation.jobs import Job
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots import comparison
@@ -20,34 +20,13 @@ from baselines.files import write
 from baselines.oracle import Search
 from baselines.oracle.several import SearchJob, find_all
 
-#: Columns of all tables, and of those with free timing or collisions.
-COLUMNS: tuple[str, ...] = (
-    *("policy", "scenario", "foresight", "seeds", "episodes", "relative_to", "cost_ratio", "low", "high", "p90"),
-    *("worst", "lost_percent", "time_p50_us", "time_p99_us"),
-)
-PATH, CONTACTS = ("path_time_s", "path_error_mm"), ("stopped_percent", "clearance_mm")
-#: Columns of the Markdown table of a map.
-CELLS = ("policy", "knowledge", "drives", "episodes", "cost_ratio", "low", "worst", "lost_percent")
 #: The search for best known costs that are not recorded: on these paths all starts find the same optimum.
 HOW = Search(starts=20, generations=0)
 
 
-def ranking(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
-    """The table of policies, see :func:`baselines.evaluation.summary.rank`.
-
-    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
-    the largest distance from the reference at the progress of the policy, or on the clock of the others. Where a
-    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
-    """
-    lines = rank(rows, policies)
-    more = PATH * bool(lines.free_timing.any()) + CONTACTS * bool(lines.stopped.notna().any())
-    lines["path_error_mm"] = lines.path_error_mm.where(lines.free_timing, lines.position_error_mm)
-    return lines.drop(columns="policy").rename(columns={"label": "policy"})[[*COLUMNS, *more]]
-
-
 def write_ranking(out: pathlib.Path, rows: Iterable[Row], policies: Sequence[str]) -> None:
     """Writes table.csv, table.md, and a plot of cost against time for each scenario."""
-    lines = ranking(rows, policies)
+    lines = rank(rows, policies)
     write(out / "table.csv", to_csv(lines).encode())
     write(out / "table.md", f"{markdown(lines)}\n".encode())
     for scenario, here in lines.groupby("scenario", sort=False):
@@ -67,7 +46,7 @@ def write_map(out: pathlib.Path, rows: Sequence[Row], jobs: Sequence[Job], polic
         dataclasses.replace(row, cost_ratio=row.cost_ratio or row.total_cost / found[row.scenario, row.seed])
         for row in rows
     ]
-    lines = ranking(scored, policies)
+    lines = rank(scored, policies)
     places = lines.scenario.str.rsplit(" ", n=2)
     lines.insert(1, "knowledge", [float(words[1]) for words in places])
     lines.insert(2, "drives", [float(words[2]) for words in places])

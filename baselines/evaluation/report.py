@@ -12,9 +12,10 @@ from typing import Any
 
 import pandas as pd
 
+from baselines.evaluation.columns import FOLLOWED_NOTE, NOTHING, POLICIES, SPREAD, WITH_IDEAL, columns
 from baselines.evaluation.metrics import AT_MARGIN, LOST_ORIENTATION, LOST_POSITION, Skipped, lacks_margin
-from baselines.evaluation.summary import FOLLOWED_NOTE, POLICIES, SPREAD, WITH_IDEAL, columns, escape_names
-from baselines.evaluation.table import NOTHING, plain
+from baselines.evaluation.summary import escape_names
+from baselines.evaluation.table import plain
 from baselines.oracle import best_known
 from ikgym.exceptions import printable
 

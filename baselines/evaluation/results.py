@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import pathlib
@@ -17,7 +16,7 @@ import ikgym
 from baselines.episodes import Episode
 from baselines.evaluation.export import FORMATS, Format
 from baselines.evaluation.jobs import Job, Options
-from baselines.evaluation.log import USUAL, trajectory_log
+from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
 from baselines.files import (
     ResultsError,
@@ -37,8 +36,6 @@ from ikgym.exceptions import InvalidInputError
 from ikgym.scenarios import SPLITS
 from ikgym.scenarios.preview import furthest
 
-#: The columns of results.csv, which are the keys of a row in results.json.
-COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 #: The report of a folder.
 PAGE = "report.html"
 #: Files of a folder that are replaced by --overwrite; other files are left alone.
@@ -88,9 +85,6 @@ class Results:
                     raise ResultsError(f"{one} is a link to another folder: remove the link.")
         self._rows = {row.key: row for row in read_rows(self._file)} if resumed else {}
         _check_comparable(self._file, list(self._rows.values()), jobs)
-        for file, row in {self.series_file(row): row for row in self._rows.values()}.items():
-            if file.exists():
-                self.series(row)  # a damaged log is refused before anything is played
         if options.overwrite:
             self._clear()
 
@@ -133,7 +127,7 @@ class Results:
         rows = [row.to_json() for row in self.rows]
         lines = [[canonical(v) if isinstance(v, (dict, list)) else v for v in row.values()] for row in rows]
         write_json(self._file, rows)
-        write(self.directory / "results.csv", csv_text(COLUMNS, lines).encode())
+        write(self.directory / "results.csv", csv_text(rows[0], lines).encode())
 
     def write(self, name: str, content: bytes) -> None:
         """Writes a file of the folder."""
@@ -154,12 +148,7 @@ class Results:
 
     def series(self, row: Row) -> dict[str, npt.NDArray[Any]]:
         """The trajectory log of the first episode of a row's policy in its scenario."""
-        file, advice = self.series_file(row), "Delete it and run again with --resume."
-        log = read_arrays(file, advice)
-        with reading(file, advice):
-            if missing := [name for name in USUAL if name not in log]:
-                raise ValueError(f"the array {missing[0]} is missing")
-        return log
+        return read_arrays(self.series_file(row), "Delete it and run again with --resume.")
 
     def _clear(self) -> None:
         """Removes the files of an earlier evaluation."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import collections
 import dataclasses
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -14,13 +13,12 @@ import numpy as np
 import pandas as pd
 
 from baselines import registry
-from baselines.evaluation.metrics import FOLLOWED_ORIENTATION, FOLLOWED_POSITION, Row, Rows
-from baselines.evaluation.table import NOTHING, Column, count, interval, number
+from baselines.evaluation.columns import COLUMNS, CONTACTS, PATH, RANKING, geometric
+from baselines.evaluation.metrics import Row, Rows
 from baselines.files import canonical, jsonable
 from baselines.oracle import best_known
 from baselines.registry import parse_policy
 from baselines.statistics import geometric_interval, geometric_mean
-from baselines.status import Status
 from ikgym.exceptions import IkgymError, InvalidInputError, printable
 
 #: The quantities by which the episodes of a scenario are compared.
@@ -31,122 +29,6 @@ BEST_KNOWN = "best known"
 #: What identifies a policy with its parameters, and a line of a table.
 _POLICY = ["policy", "text", "steps"]
 _LINE = ["scenario", "label", "text", "steps"]
-
-# Columns
-
-
-def _mark(line: Any) -> str:
-    """The policy with its marks, see the notes of :mod:`baselines.evaluation.report`."""
-    marks = {" *": line.reference, " †": line.steps_at_joint_limit, " ‡": line.free_timing}
-    return str(line.label) + "".join(mark for mark, applies in marks.items() if applies)
-
-
-def _mark_unstated(line: Any) -> str:
-    return number(line.qddot_peak) + " §" * (not line.stated)
-
-
-def _count_followed(line: Any) -> str:
-    return f"{line.followed} of {line.rows}" if line.rows > 1 else "yes" if line.followed else "no"
-
-
-def _geometric(values: pd.Series) -> float:
-    """The geometric mean; NaN if a value is missing."""
-    return geometric_mean(values) if values.notna().all() else math.nan
-
-
-def _total(values: pd.Series) -> float:
-    """The sum; NaN if all values are missing."""
-    return float(values.sum(min_count=1))
-
-
-def _largest(values: pd.Series) -> float:
-    """The largest value; NaN if one is NaN, as that of an arm that diverged."""
-    return float(values.max(skipna=False))
-
-
-def _largest_in_thousandths(values: pd.Series) -> float:
-    return 1e3 * _largest(values)
-
-
-def _worst_status(statuses: pd.Series) -> str:
-    return str(max(statuses, key=lambda status: Status[status.upper()]))
-
-
-def _columns() -> Iterable[Column]:
-    of_episodes = "geometric mean over the episodes"
-    yield Column("label", "policy", format=str, text=_mark)
-    yield Column("total_cost", "total", "cost", of_episodes, how=_geometric)
-    yield Column("tracking_cost", "tracking", "cost", how=_geometric, drop=4)
-    yield Column("cost_ratio", "cost", "ratio", f"total cost / best known cost, {of_episodes}", how=_geometric)
-    about = "largest position error"
-    yield Column("position_error_mm", "pos max", "[mm]", about, of="position_error_max", how=_largest_in_thousandths)
-    at, most = "orientation_error_max", _largest_in_thousandths
-    yield Column("orientation_error_mrad", "ori max", "[mrad]", "largest orientation error", of=at, how=most, drop=1)
-    yield Column("qdot_peak", "q̇ peak", "", "largest joint velocity, in rad/s or m/s", drop=2, how=_largest)
-    about = "largest joint acceleration, in rad/s² or m/s²; § no limit stated"
-    yield Column("qddot_peak", "q̈ peak", "", about, drop=3, text=_mark_unstated, how=_largest)
-    about = "steps with a joint at"
-    yield Column("steps_at_joint_limit", "at stop", "", f"{about} a stop", how="sum", format=count)
-    yield Column("steps_at_velocity_limit", "at q̇ limit", "", f"{about} its velocity limit", how="sum", format=count)
-    limit = f"{about} its acceleration limit"
-    yield Column("steps_at_acceleration_limit", "at q̈ limit", "", limit, how="sum", format=count)
-    about = "when the end of the path was reached, with free timing"
-    yield Column("path_time_s", "path time", "[s]", about, of="path_time", how=_largest)
-    about = "largest distance from the reference at the progress of the policy, with free timing"
-    yield Column("path_error_mm", "path err", "[mm]", about, of="path_position_error", how=_largest_in_thousandths)
-    about = "smallest distance between bodies"
-    yield Column("clearance_mm", "clearance", "[mm]", about, of="clearance_min", how=lambda values: 1e3 * values.min())
-    yield Column("stopped", "stopped", "", "episodes in which bodies would have met", how=_total, format=count)
-    yield Column("time_p50_us", "p50", "[µs]", "median time of a call after the first", how="median")
-    yield Column("time_p99_us", "p99", "[µs]", "99th percentile of these times", how="max", drop=5)
-    yield Column("deadline_misses", "misses", "", "such calls longer than Δt", how=_total, format=count, drop=6)
-    about = "number of episodes; more than one of a random scenario"
-    yield Column("episodes", "episodes", "", about, of="seed", how="nunique", format=count)
-    yield Column("mean", "geometric mean")
-    yield Column("median", "median")
-    yield Column("p90", "p90")
-    yield Column("worst", "worst")
-    yield Column("worst_seed", "worst seed", format=count)
-    yield Column("lost", "lost", "", "episodes in which the arm was lost", how="sum", format=count)
-    yield Column("followed", "followed", "", FOLLOWED_NOTE.partition(";")[0], how="sum", text=_count_followed)
-    about = "the worst that the solver reported in any step"
-    yield Column("solver_status", "solver", "status", about, how=_worst_status, format=str)
-    yield Column("ideal_cost_ratio", "ideal", "ratio")
-    yield Column("times_ideal", "× ideal", "cost")
-    yield Column("times_ideal_low", "95 %", text=lambda line: interval(line.times_ideal_low, line.times_ideal_high))
-    about = "interval of the mean cost ratio over the episodes"
-    yield Column("ratio_low", "95 %", "", about, text=lambda line: interval(line.ratio_low, line.high))
-    yield Column("ratio_worst", "worst", "", "largest cost ratio of an episode")
-
-
-FOLLOWED_NOTE = (
-    f"followed: at most {1e3 * FOLLOWED_POSITION:g} mm and {1e3 * FOLLOWED_ORIENTATION:g} mrad of error in all steps; "
-    "solver status: the worst that the solver reported"
-)
-#: All columns of terminal and report, by name.
-COLUMNS: Mapping[str, Column] = {one.key: one for one in _columns()}
-
-
-def columns(keys: Iterable[str], lines: pd.DataFrame) -> list[Column]:
-    """The columns of these names that have a value in some line."""
-    chosen = (COLUMNS[key] for key in keys)
-    return [column for column in chosen if any(cell != NOTHING for cell in column.cells(lines))]
-
-
-ERRORS = ("position_error_mm", "orientation_error_mrad", "qdot_peak", "qddot_peak")
-WHERE = ("path_time_s", "path_error_mm", "clearance_mm", "stopped")
-TIMES = ("time_p50_us", "time_p99_us", "deadline_misses")
-#: The table of all policies; of several episodes; of the comparison with ideal plants; and of the report.
-POLICIES = ("label", "total_cost", "tracking_cost", "cost_ratio", *ERRORS, *WHERE, *TIMES, "followed", "solver_status")
-SPREAD = ("episodes", "mean", "median", "p90", "worst", "worst_seed", "lost")
-WITH_IDEAL = ("ideal_cost_ratio", "times_ideal", "times_ideal_low")
-AT_LIMITS = tuple(f"steps_at_{kind}_limit" for kind in ("joint", "velocity", "acceleration"))
-REPORT = (
-    *("cost_ratio", "ratio_low", "ratio_worst", "total_cost", "followed", "lost", "episodes", *TIMES, *ERRORS, *WHERE),
-    *(*AT_LIMITS, "solver_status"),
-)
-
-# Lines
 
 
 def summarise(rows: Iterable[Row]) -> pd.DataFrame:
@@ -179,10 +61,13 @@ def escape_names(lines: pd.DataFrame) -> pd.DataFrame:
 
 
 def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
-    """One line for each policy in each scenario, sorted by cost ratio: the columns of :func:`summarise`.
+    """The table of policies: one line for each in each scenario, sorted by cost ratio.
 
     Agents whose files lie in ``DIR/seed-N/`` are training seeds of one agent, which is called DIR. `cost_ratio` and
     its interval are `relative_to` best known costs; if one of the scenario is missing, to the lowest cost in the table.
+    Where a policy has free timing, there are two more columns: the time in which it reached the end of the path, and
+    the largest distance from the reference at the progress of the policy, or on the clock of the others. Where a
+    scenario has collisions, there are the share of episodes in which the arm was stopped and the smallest clearance.
 
     Args:
         rows: Results of an evaluation.
@@ -198,12 +83,15 @@ def rank(rows: Iterable[Row], policies: Sequence[str] = ()) -> pd.DataFrame:
     # Costs too small for a ratio count as the smallest allowed.
     lowest = episodes.groupby(["scenario", "seed"]).total_cost.transform("min").clip(lower=best_known.MEANINGLESS)
     lines = _lines(episodes, ["scenario", "label"], episodes.total_cost / lowest)
+    more = PATH * bool(lines.free_timing.any()) + CONTACTS * bool(lines.stopped.notna().any())
     lines = lines.assign(
+        policy=lines.label,
         relative_to=np.where(lines.known, BEST_KNOWN, LOWEST),
         cost_ratio=lines["mean"],
         place=pd.factorize(lines.scenario)[0],
+        path_error_mm=lines.path_error_mm.where(lines.free_timing, lines.position_error_mm),
     )
-    return lines.sort_values(["place", "cost_ratio"]).drop(columns="place").reset_index(drop=True)
+    return lines.sort_values(["place", "cost_ratio"], ignore_index=True)[[*RANKING, *more]]
 
 
 def _label_episodes(rows: Iterable[Row]) -> pd.DataFrame:
@@ -213,6 +101,10 @@ def _label_episodes(rows: Iterable[Row]) -> pd.DataFrame:
         text=[canonical(row.parameters) for row in rows],
         beaten=[row.seed if best_known.beaten_record(row) else np.nan for row in rows],
         stopped=[np.nan if row.clearance_min is None else float(row.stopped is not None) for row in rows],
+        position_error_mm=lambda frame: 1e3 * frame.position_error_max,
+        orientation_error_mrad=lambda frame: 1e3 * frame.orientation_error_max,
+        path_error_mm=lambda frame: 1e3 * frame.path_position_error,
+        clearance_mm=lambda frame: 1e3 * frame.clearance_min,
     )
     for scenario, contents in out.groupby("scenario", sort=False)[["fingerprint", "test_set"]]:
         if len(different := contents.drop_duplicates()) > 1:
@@ -291,7 +183,7 @@ def _spread(key: tuple[Any, ...], rows: pd.DataFrame) -> dict[str, Any]:
 def _compare_with_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
     """Each line compared with the same policy on an ideal plant, by the seeds of both."""
     keys = [*_LINE, "policy", "fingerprint", "ideal", "seed"]
-    means = {"cost": ("total_cost", geometric_mean), "ideal_ratio": ("cost_ratio", _geometric)}
+    means = {"cost": ("total_cost", geometric_mean), "ideal_ratio": ("cost_ratio", geometric)}
     costs = episodes.groupby(keys, sort=False, dropna=False).agg(**means).reset_index()
     ideal = costs.fingerprint == costs.ideal
     plain = costs[ideal].drop_duplicates(["fingerprint", *_POLICY, "seed"], keep="last")
@@ -303,7 +195,7 @@ def _compare_with_ideal(episodes: pd.DataFrame) -> pd.DataFrame:
         if pair[["cost", "cost_plain"]].to_numpy().min() <= 0.0:
             continue
         factors = (pair.cost / pair.cost_plain).to_numpy()
-        out.append((*key, _geometric(pair.ideal_ratio_plain), geometric_mean(factors), *geometric_interval(factors)))
+        out.append((*key, geometric(pair.ideal_ratio_plain), geometric_mean(factors), *geometric_interval(factors)))
     return pd.DataFrame(out, columns=[*_LINE, "ideal_cost_ratio", "times_ideal", "times_ideal_low", "times_ideal_high"])
 
 

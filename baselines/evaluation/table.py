@@ -1,84 +1,28 @@
-"""Tables as plain text, HTML, Markdown and CSV, and numbers and names as text."""
+"""Tables as plain text, HTML, Markdown and CSV."""
 
 from __future__ import annotations
 
 import csv
-import dataclasses
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from baselines.evaluation.columns import COLUMNS, NOTHING, Column, interval, number
 from baselines.files import csv_text
 from ikgym.exceptions import InvalidInputError
 
-if TYPE_CHECKING:  # slow to import, and not needed for numbers and names
+if TYPE_CHECKING:  # slow to import, and not needed for names
     import pandas as pd
 
-#: The text of a cell without a value, and its value for sorting.
-NOTHING, LAST = "–", 1e300
+#: The value of a cell without one, for sorting.
+LAST = 1e300
 #: Longest name of a policy in a line of a plain table; longer ones have a separate line.
 LONGEST = 20
-#: Suffixes of columns and the units in the heads.
-UNITS = {
-    **{unit: unit for unit in ("ms", "s", "mm", "mrad", "rad")},
-    "us": "µs",
-    "um": "µm",
-    "deg": "°",
-    "percent": "%",
-}
 #: Columns that Markdown sets as code.
 CODE = ("policy", "scenario", "agent", "solver", "beside")
-
-
-def number(value: float | None) -> str:
-    """A number with four significant digits: ``1234``, ``0.01235``, ``1.235e7``; a dash for none."""
-    if value is None or math.isnan(value):
-        return NOTHING
-    if value == 0.0:
-        return "0"
-    digits = f"{value:#.4g}"
-    mantissa, _, exponent = digits.partition("e")
-    return f"{mantissa}e{int(exponent)}" if exponent else mantissa.removesuffix(".")
-
-
-def count(value: float) -> str:
-    """A whole number; a dash for none."""
-    return NOTHING if math.isnan(value) else f"{value:.0f}"
-
-
-@dataclasses.dataclass(frozen=True)
-class Column:
-    """A column of a table, see :func:`baselines.evaluation.summary.summarise`."""
-
-    key: str  # the name of its values
-    title: str  # its head
-    unit: str = ""  # the second line of the head
-    about: str = ""  # a description, shown in HTML when the pointer is on the head
-    _: dataclasses.KW_ONLY
-    how: Any = None  # how pandas puts the values of episodes together; None if it does not
-    of: str = ""  # the name of these values; that of the column if left out
-    format: Callable[[Any], str] = number  # the text of a value
-    drop: int = 0  # if a line is too short, columns are left out from the highest number down; those with 0 stay
-    text: Callable[[Any], str] | None = None  # the text of the cell of a line, if it is not that of its value
-
-    @property
-    def head(self) -> str:
-        """The head in one line."""
-        return f"{self.title} {self.unit}".strip()
-
-    def cells(self, lines: pd.DataFrame) -> list[str]:
-        """The texts of the column."""
-        if self.text is not None:
-            return [self.text(line) for line in lines.itertuples()]
-        return [self.format(value) for value in lines[self.key]]
-
-
-def interval(low: float, high: float) -> str:
-    """An interval: ``1.000 … 2.000``; a dash for none."""
-    return NOTHING if math.isnan(low) else f"{number(low)} … {number(high)}"
 
 
 def plain(chosen: Sequence[Column], lines: pd.DataFrame, width: int) -> tuple[str, list[Column]]:
@@ -167,8 +111,8 @@ def from_csv(text: str) -> list[dict[str, str]]:
 def markdown(lines: pd.DataFrame | Iterable[Mapping[str, Any]], names: Sequence[str] = ()) -> str:
     """Lines, or those of a CSV file, as a Markdown table with four significant digits, and units in the heads.
 
-    Names of columns end with the unit (`time_p50_us`). An interval is a pair of columns `low` and `high`, possibly with
-    a prefix; the column `low` shows it. All columns are shown if none is named.
+    Heads are those of :class:`Column`. An interval is a pair of columns `low` and `high`, possibly with a prefix; the
+    column `low` shows it. All columns are shown if none is named.
 
     Raises:
         InvalidInputError: There is no column of a name.
@@ -178,15 +122,8 @@ def markdown(lines: pd.DataFrame | Iterable[Mapping[str, Any]], names: Sequence[
     if missing := [name for name in names if name not in rows[0]]:
         raise InvalidInputError(f"columns: expected some of {', '.join(rows[0])}; got {', '.join(missing)}.")
     text = [i for i, name in enumerate(names) if any(_number(line[name]) is None for line in rows if line[name])]
-    return grid(map(_head, names), ([_cell(line, name) for name in names] for line in rows), text=text)
-
-
-def _head(name: str) -> str:
-    if f"_{name}".endswith("_low"):
-        return "95 %"
-    words, _, unit = name.rpartition("_")
-    words, unit = (words, f" [{UNITS[unit]}]") if words and unit in UNITS else (name, "")
-    return words.replace("times_", "× ").replace("time_p", "p").replace("_", " ") + unit
+    heads = [COLUMNS.get(name, Column(name)).head for name in names]
+    return grid(heads, ([_cell(line, name) for name in names] for line in rows), text=text)
 
 
 def _cell(line: Mapping[Any, Any], name: str) -> str:

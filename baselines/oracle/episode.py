@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from gymnasium.utils import seeding
 
-from baselines.episodes import Simulation, add_up, rollouts
+from baselines.episodes import add_up, begin, rollouts
 from baselines.policy import Problem, SolverPolicy
 from baselines.policy.problem import sweep_bodies
 from baselines.policy_kernels import Model
@@ -168,10 +168,10 @@ class EpisodeProblem:
             Joint coordinates after each step in [rad] or [m], of shape (steps, n), and the total cost; infinite where
             bodies touch at a step or between two, so that the arm is stopped.
         """
-        simulation = Simulation(self.scenario, [self.seed], preview=1, single=True)
+        arms, _ = begin(self.scenario, [self.seed], preview=1, single=True)
         q, costs, stopped = np.empty_like(qdot), np.empty(len(qdot)), False
         for k, action in enumerate(qdot / self.scenario.velocity_limit):
-            out = simulation.step(action)
+            out = arms.step(action)
             q[k], costs[k] = out.true_q[0], out.cost[0]
             stopped = stopped or bool(out.stopped.any())
         return q, np.inf if stopped else float(add_up(costs))

@@ -10,7 +10,6 @@ import pytest
 import baselines
 import ikgym
 from baselines.evaluate import evaluate
-from baselines.evaluation.plots import style
 from baselines.files import ResultsError
 from baselines.status import Status
 
@@ -83,13 +82,6 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
     assert empty == {not ikgym.scenarios.get(scenario).task.has_orientation}
     with pytest.raises(ResultsError, match="Cannot write"):
         track.to_csv(tmp_path / "track.csv" / "below")
-
-
-def test_plot_is_a_figure():
-    figure = baselines.track("varga7-fast", "dls", steps=STEPS).plot()
-    drawn = [line for axes in figure.axes for line in axes.lines]
-    assert len(drawn) == 2 + 3 * 2  # errors, and nominal and actual position
-    assert len(style.png(figure)) > 1000
 
 
 def test_whatever_can_be_evaluated_can_be_tracked():

@@ -9,10 +9,11 @@ import pytest
 from scipy.stats import spearmanr
 
 import baselines
-from baselines.episodes import Simulation
+from baselines.episodes import begin
 from baselines.registry import parse_policy
 from benchmarks.yardsticks import episode_rewards
 from ikgym import rl, scenarios
+from ikgym.kernels.outcome import observation
 from ikgym.rl.scoring import yardsticks
 
 #: The better one of tuned `dls` and `qp`.
@@ -71,16 +72,16 @@ def record(name, policy, change, split, episodes):
     scenario, seeds = scenarios.get(task.scenario), scenarios.seeds(split, episodes)
     kind, parameters = parse_policy(policy or "dls")
     solver = baselines.make(kind, scenario, **parameters)
-    simulation, state = Simulation(scenario, seeds, preview=solver.preview, commands=solver.commands), None
+    arms, out = begin(scenario, seeds, preview=solver.preview, commands=solver.commands)
     most = task.share * scenario.largest_qdot / scenario.velocity_limit
-    lost, distance, costs, present = np.zeros(episodes, np.bool_), np.zeros(episodes), [], []
+    state, lost, distance, costs, present = None, np.zeros(episodes, np.bool_), np.zeros(episodes), [], []
     for step in range(scenario.steps):
-        seen = simulation.seen
+        seen = observation(out)
         action, state = solver.predict(seen, state)
         action = np.clip(action / most, -1.0, 1.0) if policy else np.zeros_like(action)
         if change:
             action = changed(action, *change, (step, step / scenario.steps), seen["q"], distance, rng)
-        out = simulation.step(np.clip(action, -1.0, 1.0) * most)
+        out = arms.step(np.clip(action, -1.0, 1.0) * most)
         distance = out.position_error.copy()
         costs.append(out.cost.copy())
         present.append(~lost)

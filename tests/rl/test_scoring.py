@@ -11,7 +11,7 @@ import pytest
 
 import baselines
 import ikgym
-from baselines.episodes import Seeds, Simulation, rollouts
+from baselines.episodes import Seeds, begin, rollouts
 from benchmarks.yardsticks import Still, counted, returns
 from ikgym import rl, scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
@@ -121,8 +121,8 @@ def test_returns_of_yardsticks_are_those_of_the_environment(name):
 def test_an_arm_that_stands_still_costs_what_the_benchmark_says(name):
     task = rl.IDS[name].task
     scenario, seeds = scenarios.get(task.scenario), scenarios.seeds("validation", 2)
-    simulation = Simulation(scenario, seeds, preview=1)
-    steps = [simulation.step(np.zeros((2, 7))).tracking_cost for _ in range(scenario.steps)]
+    arms, _ = begin(scenario, seeds, preview=1)
+    steps = [arms.step(np.zeros((2, 7))).tracking_cost for _ in range(scenario.steps)]
     costs = np.sum(steps[-(task.counted or 0) :], axis=0)
     found = rl.costs(Still(), name, episodes=2)
     assert found == pytest.approx(costs, rel=1e-12)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from baselines.cli import shell
 from baselines.cli.own_path import RULES, OwnPath, scenario_of
-from baselines.evaluation.compare import compare
+from baselines.evaluation.compare.playing import compare
 
 
 def manual(prog: str) -> str:

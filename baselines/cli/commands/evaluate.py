@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable
-from typing import Annotated
-
-import tyro
 
 from baselines import registry
 from baselines.cli import shell
@@ -22,30 +18,20 @@ from ikgym import scenarios
 from ikgym.scenarios import Scenario
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Arguments(Options):
-    """Arguments of the command line."""
-
-    scenarios: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME …")] = ()
-    """Names of scenarios, FILE.toml, MODULE:ATTRIBUTE, or: all. If neither scenarios nor test sets are given:
-    varga7-fast."""
-    policies: Annotated[tuple[str, ...], tyro.conf.arg(metavar="POLICY …")] = ("all",)
-    """Policies as NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE, agent:PATH for an agent in a file, MODULE:CLASS for
-    a class of yours, also of a module in the current folder, or: all."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not (self.scenarios or self.test_sets):
-            object.__setattr__(self, "scenarios", ("varga7-fast",))
-
-    def all_scenarios(self) -> list[Scenario]:
-        """The scenarios, those of test sets included."""
-        names = scenarios.names() if "all" in self.scenarios else self.scenarios
-        return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in self.test_sets)]
+def _scenarios(given: Options) -> tuple[str, ...]:
+    """The names of scenarios; those of test sets are not among them."""
+    names: tuple[str, ...] = given.scenarios or ("varga7-fast",) * (not given.test_sets)
+    return names
 
 
-def _any(test: Callable[[Scenario], bool]) -> Callable[[Arguments], bool]:
-    return lambda given: any(map(test, given.all_scenarios()))
+def _find_all(given: Options) -> list[Scenario]:
+    """The scenarios, those of test sets included."""
+    names = scenarios.names() if "all" in given.scenarios else _scenarios(given)
+    return [*map(scenarios.find, names), *(test_sets.get(name).scenario for name in given.test_sets)]
+
+
+def _any(test: Callable[[Scenario], bool]) -> Callable[[Options], bool]:
+    return lambda given: any(map(test, _find_all(given)))
 
 
 #: Processes of this machine, or a cluster.
@@ -56,14 +42,9 @@ RULES = (
         lambda given: given.out is not None,
         "without --out",
     ),
-    Rule(
-        ("--episodes", "--split", "--steps", "--noise-seeds", "--severities"),
-        lambda given: not given.test_sets,
-        "with --test-sets, which define the episodes",
-    ),
     Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
     Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
-    Rule(("--pairs", "--severities"), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
     Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
@@ -127,10 +108,10 @@ def cut_off(played: Iterable[Scenario]) -> list[str]:
     ]
 
 
-def _work(given: Arguments, command: str) -> None:
-    for warning in cut_off(given.all_scenarios()) if given.steps is None else ():
+def _work(given: Options, command: str) -> None:
+    for warning in cut_off(_find_all(given)) if given.steps is None else ():
         print(warning, file=sys.stderr)
-    rows = evaluate(**vars(given) | {"progress": True, "command": command})
+    rows = evaluate(**vars(given) | {"scenarios": _scenarios(given), "progress": True, "command": command})
     from baselines.evaluation import report  # pandas is slow to import
     from baselines.evaluation.summary import summarise
 
@@ -143,4 +124,4 @@ def _work(given: Arguments, command: str) -> None:
         )
 
 
-main = shell.Command("evaluate", Arguments, manual, _work, RULES, shell.RESUMED, "baselines.evaluate")
+main = shell.Command("evaluate", Options, manual, _work, RULES, shell.RESUMED, "baselines.evaluate")

@@ -13,12 +13,12 @@ import ikgym
 from baselines import registry
 from baselines.controller.drives import PREDICTED, SETTINGS
 from baselines.evaluation import report
+from baselines.evaluation.columns import COLUMNS, ERRORS, TIMES, Column
 from baselines.evaluation.compare.rule import PREFERRED, RULE, Recommendation, Rows, fault, needs_retiming, recommend
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.run import evaluate
-from baselines.evaluation.summary import COLUMNS as EVERY
-from baselines.evaluation.summary import ERRORS, TIMES, summarise
-from baselines.evaluation.table import Column, plain
+from baselines.evaluation.summary import summarise
+from baselines.evaluation.table import plain
 from baselines.paths import retime
 from baselines.paths.late import describe_drives, late
 from baselines.paths.survey import RESERVE, describe_reserve
@@ -51,7 +51,7 @@ class Comparison:
             label=[solver_of(row) for row in self.rows],
             follows=["no" if fault(row, self.dt) else "yes" for row in self.rows],
         )
-        table, _ = plain(COLUMNS, lines, width)
+        table, _ = plain(SHOWN, lines, width)
         texts = [
             f"{LATE}: {self.drives}; each solver as in baselines.Controller",
             *[LIBRARY] * any(registry.get(row.policy).rival for row in self.rows),
@@ -66,13 +66,13 @@ def solver_of(row: Row) -> str:
     return str(row.parameters["policy"] if row.policy == PREDICTED else row.policy)
 
 
-COLUMNS = (
+SHOWN = (
     Column("label", "solver", format=str),
     Column("scenario", "path", format=str),
-    *(EVERY[key] for key in ERRORS[:3]),
-    dataclasses.replace(EVERY["qddot_peak"], drop=0),  # decides
-    dataclasses.replace(EVERY["steps_at_joint_limit"], unit="[steps]"),
-    *(EVERY[key] for key in TIMES[:2]),
+    *(COLUMNS[key] for key in ERRORS[:3]),
+    dataclasses.replace(COLUMNS["qddot_peak"], drop=0),  # decides
+    dataclasses.replace(COLUMNS["steps_at_joint_limit"], unit="[steps]"),
+    *(COLUMNS[key] for key in TIMES[:2]),
     Column("follows", "follows", format=str),
 )
 

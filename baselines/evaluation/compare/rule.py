@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
+from baselines.evaluation.columns import number
 from baselines.evaluation.metrics import Row
-from baselines.evaluation.table import number
 
 #: Solvers in the order in which they are preferred.
 PREFERRED = ("qp", "sns", "rhc_foresight", "dls", "pink", "mink")

@@ -14,10 +14,11 @@ from typing import Any
 import pandas as pd
 
 from baselines.evaluation import report
+from baselines.evaluation.columns import REPORT, columns
 from baselines.evaluation.html.series import BUDGET, thin
 from baselines.evaluation.metrics import Skipped
 from baselines.evaluation.results import Results
-from baselines.evaluation.summary import REPORT, columns, escape_names
+from baselines.evaluation.summary import escape_names
 from baselines.evaluation.table import html
 from ikgym.exceptions import printable
 

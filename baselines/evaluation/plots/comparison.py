@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
+from baselines.evaluation.columns import number
 from baselines.evaluation.plots import style
-from baselines.evaluation.table import number
 
 #: Excess costs below this are drawn here, in [%].
 FLOOR = 0.01

@@ -1,8 +1,5 @@
 """Rows, tables, logs and pages of scenarios with collisions and without."""
 
-import csv
-import json
-
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -14,9 +11,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation import report
 from baselines.evaluation.html.series import BUDGET, thin
 from baselines.evaluation.log import trajectory_log
-from baselines.evaluation.rankings import ranking
-from baselines.evaluation.results import read_rows
-from baselines.evaluation.summary import summarise
+from baselines.evaluation.summary import rank, summarise
 from baselines.evaluation.table import markdown
 from ikgym.obstacles.solids import closest
 from tests.baselines.evaluation.html.test_series import decoded
@@ -63,17 +58,6 @@ def test_a_row_has_the_smallest_clearance_where_nothing_stops(rows):
     assert row.closest_step == found.distances.argmin() + 1
 
 
-def test_rows_are_read_again_also_older_ones(rows):
-    _, folder = rows
-    assert read_rows(folder / "results.json") == list(rows[0])
-    old = json.loads((folder / "results.json").read_text())[2:]
-    assert [old[0].pop(name) for name in COLUMNS] == [None] * 4
-    (folder / "old.json").write_text(json.dumps(old))
-    assert read_rows(folder / "old.json") == [rows[0][2]]
-    first, *_ = csv.DictReader((folder / "results.csv").read_text().splitlines())
-    assert json.loads(first["closest_pair"]) == rows[0][0].closest_pair
-
-
 def test_tables_state_stops_where_there_can_be_any(rows):
     stopped, clear, free = rows[0]
     assert summarise(rows[0]).stopped.fillna(-1).tolist() == [1, 0, -1]
@@ -81,23 +65,11 @@ def test_tables_state_stops_where_there_can_be_any(rows):
     assert "clearance" in text
     assert "stopped: episodes in which they would have met" in " ".join(text.split())
     assert "stopped" not in report.table(summarise([free]))
-    both = ranking([stopped, clear])
+    both = rank([stopped, clear])
     assert both.stopped_percent.tolist() == [100.0, 0.0]
     assert both.clearance_mm[1] == 1e3 * clear.clearance_min
     assert "stopped [%]" in markdown(both)
-    assert "stopped_percent" not in ranking([free])
-
-
-def test_a_wrapped_policy_is_measured_alike(rows):
-    class Plain:
-        preview = 1
-
-        def predict(self, observation, state=None, episode_start=None, deterministic=True, dls=[]):  # noqa: B006
-            dls += [baselines.make("dls", blocked())] * (not dls)
-            return dls[0].predict(observation, state)
-
-    (row,) = evaluate(blocked(), Plain(), wrap=gym.wrappers.OrderEnforcing)
-    assert [getattr(row, name) for name in COLUMNS] == [getattr(rows[0][0], name) for name in COLUMNS]
+    assert "stopped_percent" not in rank([free])
 
 
 def test_a_log_has_solids_and_closest_points(log):

@@ -55,11 +55,6 @@ def test_csv_holds_the_episode_from_its_start_to_the_last_digit(tmp_path):
     np.testing.assert_array_equal(table[1:, 1:7], track.q)
     np.testing.assert_array_equal(table[1:, 7:13], track.qdot)
     np.testing.assert_allclose(table[1:, 13:], np.diff(table[:, 7:13], axis=0) / scenario.dt, rtol=1e-12)
-    evaluate(circle("tiago", steps=3), "dls", out=tmp_path / "tiago", export=["csv", "csv"])
-    (name,) = files(tmp_path / "tiago")
-    head, _ = read_csv(tmp_path / "tiago" / "export" / name)
-    assert len(head) == 17
-    assert [head[1], head[2], head[9]] == ["torso_lift_joint [m]", "arm_1_joint [rad]", "torso_lift_joint [m/s]"]
 
 
 def test_joint_trajectory_starts_and_ends_at_rest_on_time(tmp_path):

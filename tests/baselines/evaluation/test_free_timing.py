@@ -11,10 +11,10 @@ import ikgym
 from baselines.episodes import Seeds, add_up
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
+from baselines.evaluation.columns import COLUMNS
 from baselines.evaluation.motion.free_timing import reference_at
 from baselines.evaluation.motion.spline import FEWEST
-from baselines.evaluation.rankings import ranking
-from baselines.evaluation.summary import COLUMNS, summarise
+from baselines.evaluation.summary import rank, summarise
 from baselines.evaluation.table import records
 from tests.baselines.solvers.quadratic_program.paths import circle
 
@@ -74,13 +74,13 @@ def test_tables_mark_the_kind_and_others_have_no_such_columns():
     assert "‡" not in plain
     assert "path" not in plain.split("\n", 1)[1]
     assert rows[0].path_time is None
-    qp, free = sorted(records(ranking(rows)), key=lambda line: line["policy"])
+    qp, free = sorted(records(rank(rows)), key=lambda line: line["policy"])
     assert (np.isnan(qp["path_time_s"]), free["path_time_s"]) == (True, rows[1].path_time)
     assert (qp["path_error_mm"], free["path_error_mm"]) == (
         1e3 * rows[0].position_error_max,
         1e3 * rows[1].path_position_error,
     )
-    assert "path_time_s" not in ranking(rows[:1])
+    assert "path_time_s" not in rank(rows[:1])
 
 
 def test_the_motion_that_is_exported_goes_on_to_the_end_of_the_path(tmp_path):

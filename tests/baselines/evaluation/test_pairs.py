@@ -8,8 +8,8 @@ import pytest
 import ikgym
 from baselines.evaluate import evaluate
 from baselines.evaluation import report
+from baselines.evaluation.columns import number
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import number
 from ikgym import Plant
 from tests.baselines.evaluation.planning import planned
 from tests.baselines.evaluation.test_report import row

@@ -282,16 +282,6 @@ def step_at_reset(env, seed):
     return observation, info
 
 
-class Endless(gym.Wrapper):
-    """Begins again where the episode ends, and says nothing."""
-
-    def step(self, action):
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        if truncated:
-            observation, info = self.env.reset()
-        return observation, reward, terminated, False, info
-
-
 class Twice(gym.Wrapper):
     """Makes two steps at a time."""
 
@@ -303,7 +293,6 @@ class Twice(gym.Wrapper):
 CHANGING = [
     resetting(lambda env, seed: env.reset()),
     resetting(lambda env, seed: env.reset(seed=seed, options={"step": 3})),
-    resetting(lambda env, seed: env.reset(seed=seed, options={"q": np.full(7, 0.1)})),
     resetting(step_at_reset),
     Twice,
 ]
@@ -317,10 +306,6 @@ def test_wrappers_that_change_the_episode_are_refused():
     ):
         with pytest.raises(InvalidInputError, match=message):
             evaluate("varga7-random", Foreign("varga7-random"), steps=STEPS, wrap=wrap)
-    (whole,), (endless,) = (
-        evaluate("varga7-random", Foreign("varga7-random"), steps=STEPS, wrap=wrap) for wrap in (None, Endless)
-    )
-    assert numbers(endless) == numbers(whole)
 
 
 def test_models_of_stable_baselines3():

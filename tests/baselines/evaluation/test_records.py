@@ -11,8 +11,7 @@ from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
 from baselines.evaluation.plots import comparison
 from baselines.evaluation.plots.style import png
-from baselines.evaluation.rankings import ranking
-from baselines.evaluation.summary import BEST_KNOWN, LOWEST
+from baselines.evaluation.summary import BEST_KNOWN, LOWEST, rank
 from baselines.evaluation.table import from_csv, markdown, to_csv
 from baselines.statistics import geometric_interval, geometric_mean
 from ikgym.exceptions import InvalidInputError
@@ -40,22 +39,22 @@ def agent(row, seed, cost_ratios):
 class TestRanking:
     def test_one_line_per_policy_sorted_by_cost_ratio(self, row):
         rows = [*episodes(row, (4.0, 9.0)), *episodes(row, (1.0, 4.0), policy="qp", parameters={}, time_p99_us=7.0)]
-        first, second = ranking(rows).itertuples()
+        first, second = rank(rows).itertuples()
         assert (first.policy, first.cost_ratio, first.time_p99_us) == ("qp", pytest.approx(2.0), 7.0)
         assert (second.cost_ratio, second.worst, second.p90) == (pytest.approx(6.0), 9.0, 8.5)
         assert (second.episodes, second.seeds, second.relative_to) == (2, 1, BEST_KNOWN)
         assert (second.low, second.high) == geometric_interval((4.0, 9.0))
 
     def test_training_seeds_share_a_line(self, row):
-        (line,) = ranking([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))]).itertuples()
+        (line,) = rank([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0, 4.0))]).itertuples()
         assert (line.policy, line.seeds, line.episodes) == ("apg", 2, 2)
         assert line.cost_ratio == pytest.approx(2.0)
         with pytest.raises(InvalidInputError, match="apg: expected the same episodes"):
-            ranking([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
+            rank([*agent(row, 0, (1.0, 2.0)), *agent(row, 1, (2.0,))])
 
     def test_without_best_known_costs_relative_to_the_lowest(self, row):
         rows = [*episodes(row, (2.0, 8.0)), *episodes(row, (4.0, 2.0), policy="qp", parameters={})]
-        lines = ranking([dataclasses.replace(one, cost_ratio=None) for one in rows])
+        lines = rank([dataclasses.replace(one, cost_ratio=None) for one in rows])
         assert lines.relative_to.tolist() == [LOWEST] * 2
         assert lines.cost_ratio.tolist() == pytest.approx([np.sqrt(2.0), 2.0])
 
@@ -68,7 +67,7 @@ class TestRanking:
         for cost, parameters in enumerate((plain, short, *inner), 2):
             policy = "smoothed" if "options" in parameters else "rhc"
             rows += episodes(row, (float(cost),), policy=policy, parameters=parameters)
-        assert ranking(rows, given).policy.tolist() == given
+        assert rank(rows, given).policy.tolist() == given
 
 
 class TestFiles:

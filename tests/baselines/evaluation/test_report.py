@@ -10,14 +10,13 @@ import baselines
 import ikgym
 from baselines.episodes import rollout
 from baselines.evaluate import evaluate
-from baselines.evaluation import report, run
+from baselines.evaluation import report
+from baselines.evaluation.columns import number
 from baselines.evaluation.log import trajectory_log
 from baselines.evaluation.metrics import Row, Skipped
 from baselines.evaluation.plots import tracking
 from baselines.evaluation.results import read_rows
 from baselines.evaluation.summary import summarise
-from baselines.evaluation.table import number
-from baselines.files import ResultsError
 from tests.baselines.making import circle
 
 BASE = Row(
@@ -207,21 +206,6 @@ def test_the_log_has_the_accelerations_of_the_steps_from_rest():
     np.testing.assert_allclose(log["qddot"][1:], np.diff(episode.qdot, axis=0) / scenario.dt)
     unlimited = ikgym.scenarios.get("varga7-fast").replace(steps=8)
     assert "qddot" not in trajectory_log(rollout(unlimited, baselines.make("dls", unlimited), 0))
-
-
-def test_a_damaged_log_is_named_before_anything_is_played(tmp_path, monkeypatch):
-    given = {"scenarios": "faitli3-regular", "steps": 5, "out": tmp_path}
-    evaluate(**given, policies="dls")
-    monkeypatch.setattr(run, "play", None)
-    (file,) = tmp_path.glob("series/*/*.npz")
-    with np.load(file) as arrays:
-        log = dict(arrays)
-    np.savez(file, **{name: array for name, array in log.items() if name != "nominal"})
-    with pytest.raises(ResultsError, match=rf"{re.escape(str(file))} is damaged, .*the array nominal is missing"):
-        evaluate(**given, policies=["dls", "moore_penrose"], resume=True)
-    file.write_bytes(b"nothing")
-    with pytest.raises(ResultsError, match=re.escape(str(file))):
-        evaluate(**given, policies="dls", resume=True)
 
 
 def log_of(**changes):

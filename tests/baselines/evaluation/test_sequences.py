@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import baselines
 import ikgym
 from baselines.episodes import Seeds, rollout, rollouts
 from baselines.evaluate import evaluate
@@ -47,13 +46,6 @@ def test_the_state_is_handed_on(timed):
     for episode, draw, times in ((second, draws[1], 2.0), (third, draws[2], 3.0)):
         fresh = rollout(SAME_ARM, policy, draw, timed=False)
         np.testing.assert_allclose(episode.qdot[0] * times, fresh.qdot[0], rtol=1e-5)
-
-
-def test_what_does_not_survive_is_cleared():
-    draws = [Seeds(seed, 0) for seed in range(2)]
-    policy = baselines.make("rhc", SAME_ARM, horizon=3)
-    _, last = rollouts(SAME_ARM, policy, draws, in_a_row=2)
-    assert identical(last.q, rollout(SAME_ARM, policy, draws[1], timed=False).q)
 
 
 def jobs_of(episodes=7, **options):

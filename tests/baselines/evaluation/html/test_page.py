@@ -10,11 +10,12 @@ import pytest
 
 from baselines.cli.commands.evaluate import main
 from baselines.evaluate import evaluate
+from baselines.evaluation.columns import REPORT, columns
 from baselines.evaluation.html.page import embed, page
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import Skipped, describe
 from baselines.evaluation.results import PAGE, Results, read_rows
-from baselines.evaluation.summary import REPORT, columns, summarise
+from baselines.evaluation.summary import summarise
 from baselines.evaluation.table import LAST, html
 from baselines.files import ResultsError
 from baselines.statistics import geometric_interval
