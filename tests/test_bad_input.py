@@ -6,6 +6,7 @@ import functools
 import pickle
 import re
 import typing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -239,6 +240,7 @@ VARGA, SKEW = ikgym.arms.get("varga7"), ikgym.tasks.get("skew")
 TWO = ikgym.Arm("two", [[0, 0, 1], [1, 0, 0]], [[0, 0, 1], [1, 0, 0]], (False, True))
 LAW = {"speed": 1.0, "acceleration": 1.0}
 PUBLISHED = ikgym.scenarios.get("rlitg-random")
+TRACK = "ikgym/Track-v0"
 
 
 def reset(scenario="varga7-random", /, **options):
@@ -442,7 +444,20 @@ REFUSED = [
     ("drawn from ranges", lambda: ikgym.rl.make("learning-track", context=True)),
     *((name, lambda name=name, x=x: ikgym.rl.make(FAST, **{name: x})) for name, x in (
         ("lost_distance", 0.0), ("share", 0.0), ("radian", -1.0), ("half", 0.0), ("fine", 0.0), ("history", 0),
+        ("counted", np.nan), ("counted", 0), ("radian", 1e300), ("radian", 1e-300), ("history", 10**9),
     )),
+    *(("model: expected", lambda x=x: ikgym.rl.costs(x, TRACK, episodes=1)) for x in (
+        3, None, "dls", SimpleNamespace(predict=1), SimpleNamespace(predict=lambda *_, **__: 0),
+    )),
+    *(("episodes", lambda x=x: ikgym.rl.costs(None, TRACK, episodes=x)) for x in ("two", 1.5, None, 10**12)),
+    ("Did you mean", lambda: ikgym.rl.costs(None, "ikgym/Reach-v1")),
+    *(("expected", lambda x=x: ikgym.rl.score(x)) for x in (3, None, [[1.0]], {TRACK: "costs"}, {TRACK: {}})),
+    ("ikgym/Track-v0", lambda: ikgym.rl.score({"ikgym/Trak-v0": [[1.0]]})),
+    (r"of shape \(seeds, episodes\), got \(2,\)", lambda: ikgym.rl.score({TRACK: [1.0, 2.0]})),
+    ("at least 0", lambda: ikgym.rl.score({TRACK: [[-1.0]]})),
+    ("from 1 to 256, got 257", lambda: ikgym.rl.score({TRACK: np.ones((1, 257))})),
+    *(("Available: validation, test", lambda x=x: ikgym.rl.score({TRACK: [[1.0]]}, x)) for x in ("train", "x")),
+    *(("expected a list of obstacles", lambda x=x: ARM.clearance(np.zeros(7), x)) for x in (5, "x", [5], None)),
 ]  # fmt: skip
 
 

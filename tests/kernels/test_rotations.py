@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from ikgym.kernels.rotations import geodesic_angle, quaternion, rodrigues, rotation_vector
@@ -33,20 +32,12 @@ unit_vectors = (
 )
 
 
-def cross_matrix(axis):
-    x, y, z = axis
-    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-
-
 @every_axis
-def test_rodrigues_is_the_matrix_exponential(axis):
+def test_rodrigues_is_the_rotation_about_an_axis(axis):
     angles = np.array([0.0, *TINY, *MIDDLE, *NEAR_HALF_TURN, math.pi, 5.0, -0.7, -math.pi, 100.0])
     got = np.array([rodrigues(axis, angle) for angle in angles])
     vectors = angles[:, None] * axis
     np.testing.assert_allclose(got, Rotation.from_rotvec(vectors).as_matrix(), rtol=0, atol=3e-14)
-    near = abs(angles) < 10
-    exponentials = expm(angles[near, None, None] * cross_matrix(axis))
-    np.testing.assert_allclose(got[near], exponentials, rtol=0, atol=1e-14)
 
 
 @every_axis

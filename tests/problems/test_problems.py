@@ -3,7 +3,6 @@
 import hashlib
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 import ikgym
@@ -16,17 +15,6 @@ DRAWN = [name for name in problems.NAMES if name not in (*RANDOM, *problems.OBST
 def test_names():
     assert len(problems.names()) == len(set(problems.names())) == 220
     assert len(RANDOM) == 100
-
-
-@pytest.mark.parametrize("name", [*DRAWN, *RANDOM[::10]])
-def test_shapes_and_units(name):
-    positions, quaternions, starts, *_ = problems.get(name)
-    assert positions.shape == (len(positions), 3)
-    assert quaternions.shape == (len(positions), 4)
-    np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-15)
-    expected = 0 if name.startswith("cppflow") else 1 if name in RANDOM else 100
-    assert starts.shape == (expected, 7)
-    assert not any(array.flags.writeable for array in problems.get(name)[:4])
 
 
 def test_the_numbers_have_not_changed():
@@ -63,13 +51,6 @@ def test_published_trajectories_belong_to_their_paths():
             assert q.shape == (len(positions), 7)
             assert not q.flags.writeable
             np.testing.assert_allclose(q[0], starts[0], atol=1e-5)
-
-
-@pytest.mark.parametrize(("one", "other"), [("hello", "hello"), ("rotation", "rot_yz")])
-def test_both_sources_have_two_paths_in_common(one, other):
-    first, second = problems.get(f"rlitg-{one}"), problems.get(f"cppflow-fetch_arm-{other}")
-    np.testing.assert_allclose(first.positions, second.positions, atol=1.1e-6)
-    np.testing.assert_allclose(first.quaternions, second.quaternions, atol=1e-12)
 
 
 def test_boxes_are_where_they_were_published():

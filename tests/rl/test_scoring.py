@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import baselines
-import ikgym
-from baselines.episodes import Seeds, begin, rollouts
+from baselines.episodes import Seeds, rollouts
 from benchmarks.yardsticks import Still, counted, returns
 from ikgym import rl, scenarios
 from ikgym.exceptions import IkgymError, InvalidInputError
@@ -47,12 +46,10 @@ def test_the_yardsticks_are_those_of_the_episodes_that_are_scored(name, split):
     assert rl.score({name: [tuned]}, split)[name].mean == pytest.approx(1.0, abs=1e-4)
 
 
-def test_costs_of_another_split_or_of_too_many_episodes_are_refused():
+def test_costs_of_another_split_are_refused():
     found = rl.costs(Still(), TRACK, episodes=2)
     with pytest.raises(InvalidInputError, match="expected costs of the split 'test', got some of 'validation'"):
         rl.score({TRACK: [found, found]}, "test")
-    with pytest.raises(InvalidInputError, match="episodes: expected a whole number from 1 to 256, got 257"):
-        rl.score({TRACK: np.ones((1, 257))})
 
 
 def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
@@ -62,34 +59,6 @@ def test_the_mean_is_that_of_the_middle_half_of_the_seeds():
     assert found.mean == pytest.approx(0.3)
     assert 0.1 <= found.low < 0.3 < found.high <= 0.9
     assert rl.score({TRACK: costs})[TRACK] == found
-
-
-@pytest.mark.parametrize(
-    "model", [3, None, "dls", SimpleNamespace(predict=1), SimpleNamespace(predict=lambda *_, **__: 0)]
-)
-def test_what_is_no_model_is_refused(model):
-    with pytest.raises(InvalidInputError, match="model: expected"):
-        rl.costs(model, TRACK, episodes=1)
-
-
-@pytest.mark.parametrize("results", [3, None, [[1.0]], "costs", {TRACK: "costs"}, {TRACK: {}}, {TRACK: 1.0}])
-def test_results_of_other_types_are_refused(results):
-    with pytest.raises(InvalidInputError, match="expected"):
-        rl.score(results)
-
-
-@pytest.mark.parametrize("episodes", ["two", 1.5, None, 10**12])
-def test_other_numbers_of_episodes_are_refused(episodes):
-    with pytest.raises(InvalidInputError, match="expected"):
-        rl.costs(SimpleNamespace(predict=None), TRACK, episodes=episodes)
-
-
-@pytest.mark.parametrize("changes", [
-    {"counted": np.nan}, {"counted": 0}, {"radian": 1e300}, {"radian": 1e-300}, {"history": 10**9},
-])  # fmt: skip
-def test_tasks_out_of_range_are_refused(changes):
-    with pytest.raises(InvalidInputError, match=f"{next(iter(changes))}: expected"):
-        rl.make("panda-random", **changes)
 
 
 @pytest.mark.parametrize("name", rl.IDS)
@@ -117,32 +86,11 @@ def test_returns_of_yardsticks_are_those_of_the_environment(name):
     assert returns(env.unwrapped.task, [episode]) == pytest.approx([total], rel=1e-6)
 
 
-@pytest.mark.parametrize("name", [TRACK, "ikgym/Reach-v0"])
-def test_an_arm_that_stands_still_costs_what_the_benchmark_says(name):
-    task = rl.IDS[name].task
-    scenario, seeds = scenarios.get(task.scenario), scenarios.seeds("validation", 2)
-    arms, _ = begin(scenario, seeds, preview=1)
-    steps = [arms.step(np.zeros((2, 7))).tracking_cost for _ in range(scenario.steps)]
-    costs = np.sum(steps[-(task.counted or 0) :], axis=0)
-    found = rl.costs(Still(), name, episodes=2)
-    assert found == pytest.approx(costs, rel=1e-12)
-
-
 def test_settings_of_yardsticks_play_the_same_steps():
     scenario, seeds = scenarios.get("learning-reach"), scenarios.seeds("validation", 2)
     episodes = rollouts(scenario, baselines.make("dls", scenario, gain=0.3), seeds)
     costs = [(one.tracking_cost + one.velocity_cost)[50:].sum() for one in episodes]
     assert counted("ikgym/Reach-v0", "dls:gain=0.3", "validation", 2) == pytest.approx(np.log1p(costs), rel=1e-12)
-
-
-@pytest.mark.parametrize(("results", "message"), [
-    ({"ikgym/Trak-v0": [[1.0]]}, "ikgym/Track-v0"),
-    ({TRACK: [1.0, 2.0]}, r"of shape \(seeds, episodes\), got \(2,\)"),
-    ({TRACK: [[-1.0]]}, "at least 0"),
-])  # fmt: skip
-def test_wrong_results_are_refused(results, message):
-    with pytest.raises(IkgymError, match=message):
-        rl.score(results)
 
 
 def test_models_that_see_the_inverse_are_scored_in_the_same_scenario():
@@ -156,11 +104,3 @@ def test_models_that_see_the_inverse_are_scored_in_the_same_scenario():
         rl.costs(Inverse(), TRACK, episodes=1, scenario="learning-fast")
     with pytest.raises(IkgymError, match="unexpected keyword argument 'inwerse'"):
         rl.costs(Inverse(), TRACK, episodes=1, inwerse=True)
-
-
-def test_wrong_names_are_refused():
-    for split in ("train", "thresholds"):
-        with pytest.raises(IkgymError, match="Available: validation, test"):
-            rl.score({TRACK: [[1.0]]}, split)
-    with pytest.raises(IkgymError, match="Did you mean"):
-        ikgym.rl.costs(Still(), "ikgym/Reach-v1")

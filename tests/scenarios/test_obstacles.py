@@ -112,9 +112,3 @@ def test_too_many_obstacles_are_counted_first(tmp_path):
     (tmp_path / "many.toml").write_text(text + 1001 * box)
     with pytest.raises(InvalidInputError, match="obstacles: expected at most 1000 tables, got 1001"):
         ikgym.scenarios.load(tmp_path / "many.toml")
-
-
-@pytest.mark.parametrize("wrong", [5, "box", [5], None])
-def test_what_is_no_obstacle_is_refused(wrong):
-    with pytest.raises(InvalidInputError, match="obstacles: expected a list of obstacles, got"):
-        ikgym.arms.get("panda").clearance(np.zeros(7), wrong)

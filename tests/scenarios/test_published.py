@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import ikgym
 from ikgym import problems, scenarios
 from ikgym.exceptions import InvalidInputError, UnknownNameError
 from tests.comparison import identical
@@ -59,16 +58,6 @@ def test_the_waypoints_are_met_at_their_steps_from_a_clear_start_on(name):
     assert (first <= scenario.arm.upper).all()
     assert not len(starts) or identical(first, starts[0])
     assert scenario.arm.clearance(first, scenario.obstacles)[0] > 0.0 or not scenario.obstacles
-
-
-def test_the_panda_ends_at_its_hand():
-    """`panda_hand` is mounted on the flange, turned by -45° about its z axis (franka_description)."""
-    flange, hand = ikgym.arms.get("panda"), scenarios.get("cppflow-panda-square").arm
-    rotation, position = flange.forward(flange.home)
-    turned, there = hand.forward(flange.home)
-    np.testing.assert_allclose(there, position, atol=1e-15)
-    expected = rotation @ Rotation.from_euler("z", -45, degrees=True).as_matrix()
-    np.testing.assert_allclose(turned, expected, atol=1e-15)
 
 
 def test_the_seed_chooses_a_path_and_its_start():

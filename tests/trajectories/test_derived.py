@@ -26,14 +26,6 @@ def test_poses_and_joint_coordinates():
     np.testing.assert_array_equal(slower.joint_bound(), MOTION.joint_bound())
 
 
-def test_files_keep_every_number(tmp_path):
-    scenario = CIRCLE.replace(trajectory=MOTION.replace(q=np.tile(CIRCLE.start_of(), (4, 1))))
-    scenario.save(tmp_path / "motion.toml")
-    read = ikgym.scenarios.load(tmp_path / "motion.toml").trajectory
-    np.testing.assert_array_equal(read.q, scenario.trajectory.q)
-    np.testing.assert_array_equal(read.times, TIMES)
-
-
 def test_poses_in_another_time():
     """Rates 0, 1, 1 at 0, 2, 4 s: progress t²/4, then t - 1."""
     slower = RetimedTrajectory(CIRCLE.trajectory, [0.0, 2.0, 4.0], [0.0, 1.0, 3.0], [0.0, 1.0, 1.0])
