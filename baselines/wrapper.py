@@ -49,18 +49,18 @@ class Wrapper(SolverPolicy, abc.ABC):
         """The wrapper's memory, then that of the inner policy."""
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.initial_memory(rows))
 
-    def restarted(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
-        """See :meth:`SolverPolicy.restarted`; the inner policy keeps its memory."""
+    def restart(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+        """See :meth:`SolverPolicy.restart`; the inner policy keeps its memory."""
         outer, inside = self.split(memory)
-        fresh = () if self.inner is None else self.inner.restarted(inside, rows)
-        return *self.own_restarted(outer, rows), *fresh
+        fresh = () if self.inner is None else self.inner.restart(inside, rows)
+        return *self.restart_own(outer, rows), *fresh
 
     def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
         """See :meth:`SolverPolicy.recall`; the inner policy's command."""
         outer, inside = self.split(memory)
         return *outer, *(() if self.inner is None else self.inner.recall(inside, qdot, change))
 
-    def own_restarted(self, outer: Any, rows: npt.NDArray[np.bool_]) -> Memory:
+    def restart_own(self, outer: Any, rows: npt.NDArray[np.bool_]) -> Memory:
         """The wrapper's memory, cleared where an episode begins."""
         return replace_rows(outer, self.own_memory(len(rows)), rows)
 

@@ -106,7 +106,7 @@ def _grid(name: str, **values: Sequence[Any]) -> list[str]:
 
 
 class Still:
-    """An arm that stands still."""
+    """An arm at rest."""
 
     def predict(self, observation: FloatArray, state: Any = None, **_: Any) -> tuple[FloatArray, Any]:
         """No motion."""

@@ -32,7 +32,7 @@ def watch(q, qdot, pose, nominal, q_age, pose_age, kind, bounds, numbers, kept, 
         pose: Task coordinates. Shape (m,).
         nominal: The reference ahead. Shape (p, m).
         q_age: How many periods ago q was measured.
-        pose_age: The same of the pose.
+        pose_age: How many periods ago the pose was measured.
         kind: The kind of task coordinates.
         bounds: Shape (3, n).
         numbers: Shape (5,).
@@ -153,7 +153,7 @@ def brake(most, steps, last, change, out):
 
 
 @kernel
-def refused(bounds, stops, wanted, command, change, q, qdot, dt):
+def find_broken_limit(bounds, stops, wanted, command, change, q, qdot, dt):
     """The limit that a command breaks, see :data:`baselines.controller.mock_arm.REFLEXES`; 0 if none.
 
     Args:

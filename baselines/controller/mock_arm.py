@@ -160,7 +160,7 @@ class ArmInterface:
         if self._missed > MOST_LOST:
             return Reflex.COMMUNICATION
         before, state, dt = (self._command, self._change), (self.true_q, self._out.qdot[0]), self.scenario.dt
-        return REFLEXES[kernels.refused(self._bounds, self._stops, wanted, *before, *state, dt)]
+        return REFLEXES[kernels.find_broken_limit(self._bounds, self._stops, wanted, *before, *state, dt)]
 
 
 class MockArm:

@@ -25,7 +25,7 @@ JITTER, RARE = 0.3, 0.02
 OUTSIDE = 0.2
 #: A command this close to its limit is saturated, in shares of it; and the share of rows in which it may be.
 AT_LIMIT, SATURATED = 0.999, 0.02
-#: Commands of so many times the velocity limit are not saturated, but in degrees.
+#: Commands beyond this multiple of the velocity limit are in degrees, not saturated.
 BEYOND = 3.0
 
 
@@ -75,7 +75,7 @@ def _csv(path: pathlib.Path, arm: Arm) -> tuple[FloatArray, dict[str, FloatArray
     try:
         frame = pd.read_csv(content, skipinitialspace=True, nrows=MOST_ROWS + 1)
     except (ValueError, pd.errors.ParserError) as error:
-        raise InvalidInputError(f"expected CSV with a line of names, got a fault: {str(error).strip(' .')}.") from None
+        raise InvalidInputError(f"invalid CSV, expected a line of names first: {str(error).strip(' .')}.") from None
     frame.columns = [str(name).strip() for name in frame.columns]
     if len(frame) > MOST_ROWS:
         raise InvalidInputError(f"expected at most {MOST_ROWS} rows, got more.")
@@ -120,7 +120,7 @@ def _mcap(path: pathlib.Path, arm: Arm) -> tuple[FloatArray, dict[str, FloatArra
                 values = _values(message, arm, "velocity" if commanded else "position")
                 (commands if commanded else states).append((1e-9 * stamp, values))
     except AnyReaderError as error:
-        raise InvalidInputError(f"expected an MCAP file, got a fault: {str(error).strip(' .')}.") from None
+        raise InvalidInputError(f"invalid MCAP file: {str(error).strip(' .')}.") from None
     if not states or not commands:
         raise InvalidInputError(
             f"expected joint states and, in a topic with 'command' in its name, commands; got {len(states)} and "

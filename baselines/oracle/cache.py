@@ -51,7 +51,7 @@ def solve(
     Args:
         scenario: The tracking problem, or its name.
         seed: The reset seed.
-        how: How thoroughly is searched.
+        how: Search settings.
         arm_seed: Which arm moves; that of the seed if left out.
         cached: Whether to look on disk first, and to keep the result there.
         tick: Called now and then with the share of the work done since the last call.

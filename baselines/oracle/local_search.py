@@ -25,7 +25,7 @@ STEPS, PRECISION = 50, 1e-4
 SLACK = 10.0 * LEFT
 # A branch that gains less than this share is the same path.
 GAIN = 1e-4
-# Probability that a branch is blended with another path, and that it returns to its own.
+# Probability that a branch is blended with another path, and that it returns to the first.
 BLENDED, BACK = 0.6, 0.2
 # Knots over which two paths are blended, as a share of all, at most.
 BLEND = 0.3
@@ -113,20 +113,20 @@ def iterated_local_search(problem, seed, rounds, partners, paths, costs, first, 
 def branch_off(problem, draws, path, partners, drift, branch, workspace):
     """A random change of a path.
 
-    The branch leaves the path at a random knot, drifts in the null space, and goes its own way to the end or comes
+    The branch leaves the path at a random knot, drifts in the null space, and continues freely to the end or comes
     back; or it goes over to a partner (P, K, n), or comes from there. ``draws`` are the key of the random numbers and
     the number of the branch; ``drift`` is scratch.
     """
     key, r = draws
     knots = path.shape[0]
     damping = draw(key, 2 * r, drift)
-    own = STREAM * (2 * r + 1)
-    kind, share = uniform(key, own + 1), uniform(key, own + 2)
+    stream = STREAM * (2 * r + 1)
+    kind, share = uniform(key, stream + 1), uniform(key, stream + 2)
     off = int(share * knots)
     if kind < BLENDED:
-        other = partners[int(uniform(key, own + 3) * partners.shape[0])]
-        width = max(BLEND * knots * uniform(key, own + 4) ** 2, 1.0)
-        if uniform(key, own + 5) < 0.5:
+        other = partners[int(uniform(key, stream + 3) * partners.shape[0])]
+        width = max(BLEND * knots * uniform(key, stream + 4) ** 2, 1.0)
+        if uniform(key, stream + 5) < 0.5:
             _blend(path, other, off, width, branch)
         else:
             _blend(other, path, off, width, branch)
@@ -135,7 +135,7 @@ def branch_off(problem, draws, path, partners, drift, branch, workspace):
         initial_guess(problem, off, drift, damping, branch, workspace)
         if kind < BLENDED + BACK:
             # as far as it went off, so long it takes to come back
-            length = max(uniform(key, own + 3) * (knots - off), 1.0)
+            length = max(uniform(key, stream + 3) * (knots - off), 1.0)
             _blend(branch, path, off + 1.5 * length, length, branch)
 
 

@@ -28,7 +28,7 @@ class SearchJob:
     Args:
         scenario: The tracking problem.
         draw: Which of its episodes.
-        how: How thoroughly is searched.
+        how: Search settings.
         policies: Specs of policies whose paths are starts, too.
         cached: Whether to look on disk first, and to keep the result there.
     """

@@ -11,7 +11,7 @@ from ikgym.kernels.jit import inlined, kernel, uncounted
 PAIRS = 12
 ROWS = 2 * PAIRS
 # Share of the distance of influence at which two bodies of the arm are looked at: they are always near each other.
-OWN = 0.33
+SELF = 0.33
 # A nearest point so close to the end of a body's core is that end, in [m].
 AT_END = 1e-9
 # A joint motion that changes a distance by less than this for a unit of joint motion is no way to change it, in [m].
@@ -70,7 +70,7 @@ def near_distances(chain, shapes, checked, boxes, q, within, work, distances, re
     found, count = nearest(shapes, boxes, checked, placed, core, within, near), 0
     for i in range(found):
         first, second, vector = near[1][i, 0], near[1][i, 1], near[2][i]
-        reach = within if second >= placed.shape[0] else OWN * within
+        reach = within if second >= placed.shape[0] else SELF * within
         for end in range(2):
             rise = _other_end(placed[first], vector) if end else 0.0
             if not 0.0 <= rise <= reach - near[0][i]:

@@ -29,7 +29,7 @@ APART, TARGET, AXES, AXES_RADIUS, BALL, BELOW = 1.1, 0.16, 0.09, 0.004, 0.012, 0
 # Distance of the camera from one arm, further distance for each other one, and height of the point it looks at.
 FAR, FARTHER, LOOKED_AT = 1.4, 1.0, 0.3
 # Vertical field of view of the camera in [rad], and the share of half of it by which the panel shifts the centre.
-VIEW, BESIDE = 0.7, 0.4
+VIEW, ASIDE = 0.7, 0.4
 #: Colours (red, green, blue) of obstacles and of the line between the closest pair, and opacities.
 OBSTACLE, LINE = (168, 140, 110), (34, 34, 34)
 OF_BODIES, OF_OBSTACLES = 0.35, 0.6
@@ -185,7 +185,7 @@ class Drawing:
         others = len(self._arms) - 1
         far = (FAR + FARTHER * others) * self._size
         # The panel covers the right: the camera looks at a point next to the middle of the arms.
-        middle = -0.5 * APART * others * self._size + BESIDE * far * np.tan(0.5 * VIEW)
+        middle = -0.5 * APART * others * self._size + ASIDE * far * np.tan(0.5 * VIEW)
         camera.fov = VIEW
         camera.position = (0.9 * far, middle + 0.3 * far, (0.3 + LOOKED_AT) * far)
         camera.look_at = (0.0, middle, LOOKED_AT * self._size)

@@ -154,7 +154,7 @@ def w_reduces_q7_and_q8(runs: Runs) -> Finding:
 
 
 def stable_and_convergent(runs: Runs) -> Finding:
-    """On the path the error must not grow; with the target held, it must go on falling."""
+    """On the path the error must not grow; with the target held, it must keep falling."""
     points, scenario = at_points(runs, Q7Q8, **BLOCKED), runs.scenario(Q7Q8)
     held = runs.play(scenario.replace(iterations_per_point=(scenario.steps,)), METHOD, **BLOCKED)
     at = [min(k, scenario.steps) - 1 for k in (1_000, 10_000, 100_000)]

@@ -105,13 +105,13 @@ def _figure(
     title = f"{subject}, nominal path by {path}" + "".join(text for key, text in WEIGHTED.items() if key in given)
     title = title if draw is not _generator else subject
 
-    def drawn(runs: Runs) -> Figure:
+    def draw_runs(runs: Runs) -> Figure:
         scenario, points, other = runs.scenario(name), at_points(runs, name, **given), at_points(runs, name)
         joint_path = scenario.nominal_joint_path()
         nominal = np.zeros_like(points.q) if joint_path is None else joint_path[1:][scenario.counted()[1:]]
         return draw(title, points, other if given else points, nominal)
 
-    return PaperFigure(number, title, drawn)
+    return PaperFigure(number, title, draw_runs)
 
 
 TRACKING, ERRORS, JOINTS, ANGLES = "Tracking", "Tracking errors", "Joint coordinates", "Angles of both rotations"

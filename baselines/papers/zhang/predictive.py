@@ -109,15 +109,15 @@ def _changes(pairs: Pairs) -> Finding:
 def _smoothness(runs: Runs, values: Callable[[Episode], FloatArray]) -> Finding:
     """Roughness after the transient, and in example 1 as printed with the transient as well."""
 
-    def settled(_path: str, episode: Episode) -> float:
+    def rough(_path: str, episode: Episode) -> float:
         return roughness(values(episode)[settled_from(episode) :])
 
     example = adaptive(runs), predictive(runs)
     pairs = {
         "example 1, whole": (roughness(values(example[0])), roughness(values(example[1]))),
-        "example 1, settled": (settled(HELIX, example[0]), settled(HELIX, example[1])),
+        "example 1, settled": (rough(HELIX, example[0]), rough(HELIX, example[1])),
     }
-    return _changes({**pairs, **_by_path_and_lambda(runs, settled, (HELIX, LINE, *SINGULAR))})
+    return _changes({**pairs, **_by_path_and_lambda(runs, rough, (HELIX, LINE, *SINGULAR))})
 
 
 def smoother_inputs(runs: Runs) -> Finding:

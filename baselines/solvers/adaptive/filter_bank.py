@@ -61,7 +61,7 @@ class ChangeModel(NamedTuple):
     Attributes:
         rate: The probability of a change in a step, of all alike or of each, equally likely.
         alike: Variance of a change of all joint zeros alike, in [rad²] or [m²].
-        each: The same of a change of each by itself.
+        each: Likewise of a change of each alone.
         walk: Variance of the change in each step.
         jump: Variance of a change where poses are farther from what was expected than noise brings them (the cumulative
             sum of Page 1954); 0 for none.
@@ -115,9 +115,9 @@ class ArmFilters(Corrected, abc.ABC):
         since = np.zeros(rows, np.int64)
         return BankMemory(*self.sensors(rows), since, estimates, covariances, weights, surprise, quiet)
 
-    def own_restarted(self, outer: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
-        """See :meth:`Wrapper.own_restarted`; the arm is the same one as before, if it is kept."""
-        fresh = BankMemory(*super().own_restarted(outer, rows))
+    def restart_own(self, outer: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
+        """See :meth:`Wrapper.restart_own`; the arm is the same one as before, if it is kept."""
+        fresh = BankMemory(*super().restart_own(outer, rows))
         kept = outer._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
         return kept if self.keep else fresh
 
@@ -167,7 +167,7 @@ class FilterBank(ArmFilters):
         zero, link, axis, start, keep: See :class:`ArmFilters`.
         noises: Standard deviation of each part of a measured pose, one a filter, in [m] and [rad]. Above 0.
         alike: Standard deviation of a sudden change of all joint zeros alike, in [rad] or [m].
-        each: The same of a change of each by itself.
+        each: Likewise of a change of each alone.
         rate: How often joint zeros change in either way, in [1/s].
 
     Raises:
@@ -215,7 +215,7 @@ def bank_rows(rule, q, pose, then, new, known, deviation, old):
         if changes.walk > 0.0:
             for k in range(variances.shape[0]):
                 add_to_zeros(changes.walk, n, known.covariances[row, k])
-        mean = mixed(weights, estimates)
+        mean = mix_rows(weights, estimates)
         arm = write_deviation(chain, kind, mean, q[row], parts, old[row])
         deviation[row] = old[row]
         if new[row]:
@@ -233,7 +233,7 @@ def bank_rows(rule, q, pose, then, new, known, deviation, old):
                     if surprise[k] < 0.0:
                         known.quiet[row], surprise[k] = 0, 0.0
             normalise(weights)
-            write_deviation(chain, kind, mixed(weights, estimates), q[row], parts, deviation[row])
+            write_deviation(chain, kind, mix_rows(weights, estimates), q[row], parts, deviation[row])
 
 
 @inner
@@ -291,7 +291,7 @@ def merge(weights, means, covariances, mean, covariance):
         mean: Receives the mean. Shape (p,).
         covariance: Receives the covariance. Shape (p, p).
     """
-    mean[:], covariance[:] = mixed(weights, means), 0.0
+    mean[:], covariance[:] = mix_rows(weights, means), 0.0
     for k in range(weights.shape[0]):
         share, away = math.exp(weights[k]), means[k] - mean
         if share > 0.0:
@@ -318,7 +318,7 @@ def normalise(weights):
 
 
 @inner
-def mixed(weights, values):
+def mix_rows(weights, values):
     """The mean of some rows, by the logarithms of their probabilities. Shapes (K,), (K, p)."""
     out = np.zeros(values.shape[1])
     for k in range(values.shape[0]):

@@ -12,7 +12,13 @@ from baselines.policy import Memory
 from baselines.policy.compiled import derived
 from baselines.solvers.quadratic_program.base import VelocityProgram
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.path_memory import PathMemory, moved, moves_around, remember, slope
+from baselines.solvers.quadratic_program.path_memory import (
+    PathMemory,
+    interpolate_motion,
+    moves_around,
+    remember,
+    slope,
+)
 from baselines.solvers.quadratic_program.path_speed import SEGMENTS, joint_path_ahead, path_speed
 from baselines.solvers.quadratic_program.program import (
     SCALING_WEIGHT,
@@ -127,7 +133,7 @@ def _path_ahead(model, numbers, samples, progress, last, pose, q, jacobian, moti
     moves, passed, tangents = np.empty((4, e)), np.empty(e), np.empty((numbers.segments, n))
     rotation, position, geometric = np.empty((3, 3)), np.empty(3), np.empty((6, n))
     moves_around(model.kind, samples, first, moves)
-    moved(moves, part, passed)
+    interpolate_motion(moves, part, passed)
     tasks.error(model.kind, samples[first % samples.shape[0]], pose, missing)
     missing += passed
     slope(moves, part, SHORT, motion)

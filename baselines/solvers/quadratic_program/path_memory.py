@@ -58,14 +58,14 @@ def moves_around(kind, samples, first, moves):
 def slope(moves, part, steps, out):
     """Mean motion of the reference in one step, from a part of a step on: ``steps`` at most 1, ``out`` (e,)."""
     passed = np.empty(out.shape[0])
-    moved(moves, part, passed)
-    moved(moves, part + steps, out)
+    interpolate_motion(moves, part, passed)
+    interpolate_motion(moves, part + steps, out)
     for a in range(out.shape[0]):
         out[a] = (out[a] - passed[a]) / steps
 
 
 @inner
-def moved(moves, part, out):
+def interpolate_motion(moves, part, out):
     """Motion of the reference from a sample on, by a cubic spline with the mean motion as slope (Catmull and Rom 1974).
 
     Args:

@@ -96,9 +96,9 @@ def _largest_square(tangent, other, steps, square, change):
     """
     most = math.inf
     for j in range(tangent.shape[0]):
-        own, behind = other[j] - 3.0 * tangent[j], 3.0 * other[j] - tangent[j]
-        if own != 0.0:
-            most = min(most, (4.0 * steps * change[j] - math.copysign(1.0, own) * behind * square) / abs(own))
+        here, there = other[j] - 3.0 * tangent[j], 3.0 * other[j] - tangent[j]
+        if here != 0.0:
+            most = min(most, (4.0 * steps * change[j] - math.copysign(1.0, here) * there * square) / abs(here))
     return max(most, 0.0)
 
 

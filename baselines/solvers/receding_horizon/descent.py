@@ -37,7 +37,7 @@ def stop_test(value, norm, settings, step):
 
 
 @inner
-def adapted(alpha, norm, last_norm, settings):
+def adapt_alpha(alpha, norm, last_norm, settings):
     """α for the next step: larger where the norm fell, smaller where it rose, within its bounds; as it is at first."""
     if last_norm == 0.0:
         return alpha
@@ -68,7 +68,7 @@ def take_step(x, alpha, gradient):
 
 @inner
 def stop_if_diverged(status, value, first_value, limit, qdot):
-    """Finds out a blow-up that looks like convergence, and clears the plan after any; gives a :class:`Status`.
+    """Detects divergence that looks like convergence, and clears the plan after any; gives a :class:`Status`.
 
     A gradient of 0 beyond all limits, at a cost that has risen, is no minimum: the finite differences have drowned.
     """

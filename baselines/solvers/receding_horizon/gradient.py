@@ -15,7 +15,7 @@ from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
     DescentMemory,
-    adapted,
+    adapt_alpha,
     squares,
     stop_if_diverged,
     stop_test,
@@ -172,7 +172,7 @@ def descend_rows(data, settings, q, nominal, memory, status, iterations):
             status[row] = stop_test(value, norm, settings, step)
             if status[row] != GOES_ON:
                 break
-            alpha[row] = adapted(alpha[row], norm, last_norm, settings)
+            alpha[row] = adapt_alpha(alpha[row], norm, last_norm, settings)
             last_norm = norm
             take_step(qdot, alpha[row], gradient)
             step += 1

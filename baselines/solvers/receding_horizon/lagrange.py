@@ -11,7 +11,7 @@ import numpy as np
 from baselines.solvers.receding_horizon.descent import (
     DIVERGED,
     GOES_ON,
-    adapted,
+    adapt_alpha,
     squares,
     stop_if_diverged,
     stop_test,
@@ -127,7 +127,7 @@ def reduce_rows(with_tasks, data, settings, q, nominal, memory, status, iteratio
             status[row] = stop_test(value, norm, settings, step)
             if status[row] != GOES_ON:
                 break
-            alpha[row] = adapted(alpha[row], norm, last_norm, settings)
+            alpha[row] = adapt_alpha(alpha[row], norm, last_norm, settings)
             last_norm = norm
             take_step(errors, alpha[row], by_errors)
             take_step(states, alpha[row], by_q)

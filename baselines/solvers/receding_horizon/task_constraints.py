@@ -73,7 +73,7 @@ def kinematic_errors(data, nominal, q, errors):
 
 @kernel
 def _error(data, nominal, q, workspace, error):
-    """ε of one grid point, see :func:`tracking_error`; a kernel of its own, as when its time was measured."""
+    """ε of one grid point, see :func:`tracking_error`; a separate kernel, as when its time was measured."""
     tracking_error(data, nominal, q, workspace, error)
 
 

@@ -16,7 +16,7 @@ from baselines.solvers.receding_horizon.newton.terms import (
     derivatives_without_kink,
     kink_steepness,
     one_side,
-    smoothed,
+    smooth,
     velocity_cost,
     velocity_derivatives,
     without_kink,
@@ -129,7 +129,7 @@ def _add_tracking(problem, path, barrier, advance, exact, workspace):
             first, curved = derivatives_without_kink(cost, error[i], steepness)
             first, curved = weight * first, weight * curved
             if steepness > 0.0:
-                kink = bounded(barriers, k, i, error[i] / delta, -1.0, 1.0, 1.0, weight * steepness, mu, advance)
+                kink = both_sides(barriers, k, i, error[i] / delta, -1.0, 1.0, 1.0, weight * steepness, mu, advance)
                 total += kink.value
                 first += kink.gradient / delta
                 curved += kink.curvature / (delta * delta)
@@ -163,19 +163,19 @@ def _add_motion(problem, path, barrier, advance, workspace):
             change = velocity - (before[j] if k > 0 else problem.qdot_before[j])
             before[j], limit, most = velocity, limits[j], span * changes[j]
             per = dt / changes[j] if ends else 0.0  # 1 / q̈_max
-            speed = bounded(barriers, k, e + j, velocity, -limit, limit, limit, weight, mu, advance)
-            turn = bounded(barriers, k, e + n + j, change, -most, most, most, weight, mu, advance)
+            speed = both_sides(barriers, k, e + j, velocity, -limit, limit, limit, weight, mu, advance)
+            turn = both_sides(barriers, k, e + n + j, change, -most, most, most, weight, mu, advance)
             reach = path[k, j] + braking_way(velocity, per)
-            place = bounded(barriers, k, e + 2 * n + j, reach, lower[j], upper[j], dt * limit, weight, mu, advance)
+            place = both_sides(barriers, k, e + 2 * n + j, reach, lower[j], upper[j], dt * limit, weight, mu, advance)
             first, twice = velocity_derivatives(cost, velocity)
             count = velocities[k] * joint_weights[j]
             total += count * velocity_cost(cost, velocity) + speed.value + turn.value + place.value
             # The place reached, q + v |v| / (2 q̈_max), by the chain rule; its curvature where it is convex.
             further = per * abs(velocity)
-            own = max(math.copysign(per, velocity) * place.gradient, 0.0)
+            convex = max(math.copysign(per, velocity) * place.gradient, 0.0)
             by_velocity = (count * first + speed.gradient + place.gradient * further) * rate
             mixed = place.curvature * further * rate
-            curved = count * twice + speed.curvature + place.curvature * further * further + own
+            curved = count * twice + speed.curvature + place.curvature * further * further + convex
             curved *= rate * rate
             a, c, turned = rate, rate_before, turn.curvature
             gradient[k, j] += by_velocity + place.gradient + turn.gradient * a
@@ -218,14 +218,14 @@ def _value(x, low, high, scale, weight, mu):
     """φ of both bounds of x, in units of a scale."""
     total = 0.0
     if high < math.inf:
-        total += smoothed((x - high) / scale, weight, mu).value
+        total += smooth((x - high) / scale, weight, mu).value
     if low > -math.inf:
-        total += smoothed((low - x) / scale, weight, mu).value
+        total += smooth((low - x) / scale, weight, mu).value
     return total
 
 
 @inlined
-def bounded(barriers, k, i, x, low, high, scale, weight, mu, advance):
+def both_sides(barriers, k, i, x, low, high, scale, weight, mu, advance):
     """The ``i``-th quantity of knot ``k`` between its bounds; gives a :class:`Bounded`, and brings its λ up to date."""
     value = gradient = curvature = 0.0
     if high < math.inf:

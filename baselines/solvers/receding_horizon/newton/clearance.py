@@ -16,7 +16,7 @@ from baselines.solvers.receding_horizon.newton.terms import (
     BEYOND,
     one_side,
     primal_dual_curvature,
-    smoothed,
+    smooth,
 )
 from baselines.solvers.receding_horizon.newton.workspace import joints_at
 from ikgym.kernels.bodies import gradient, nearest, place, smallest
@@ -60,7 +60,7 @@ def least_clearance(clearance, chain, q, step, work):
 def _at_influence(clearance, weight, mu):
     """Where the influence of a pair begins: u, and φ with its slope and its curvature there."""
     u = (clearance.margin - clearance.influence) / SCALE
-    here = smoothed(u, weight, mu)
+    here = smooth(u, weight, mu)
     return u, here.value, here.gradient, primal_dual_curvature(here, weight, here.gradient)
 
 
@@ -76,7 +76,7 @@ def clearance_value(clearance, problem, path, barrier, workspace):
         q = joints_at(problem, path, k, workspace.knot)
         for i in range(find_pairs(clearance, chain, q, problem.grid.at[k], work)):
             u = (clearance.margin - work.distances[i]) / SCALE
-            total += smoothed(u, weight, mu).value - value - (slope + 0.5 * curvature * (u - far)) * (u - far)
+            total += smooth(u, weight, mu).value - value - (slope + 0.5 * curvature * (u - far)) * (u - far)
     return total
 
 

@@ -96,7 +96,7 @@ def minimise(problem, path, multipliers, settings, workspace):
             outcome = CONVERGED
             break
         if not updated and promised <= UPDATE_BELOW * min(gap, gap * gap):
-            # Near the minimum for these multipliers, which are not yet its own. Updated once more at the same path
+            # Near the minimum for these multipliers, which are not yet final. Updated once more at the same path
             # they would overshoot, and those of limits, which have no bound, would oscillate without end.
             made, updated = made + 1, True
             penalty_factor[0] = _penalty_factor(penalty_factor[0], gap, left_open)

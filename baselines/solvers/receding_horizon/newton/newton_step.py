@@ -85,12 +85,12 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
     The blocks two away from the diagonal are diagonal and stay so; those next to it fill up on the way.
     """
     knots, n = step.shape
-    far, beside = model.far, model.beside
+    far, filled = model.far, model.filled
     for k in range(knots):
         pivot_of(model, exact, damping, k, factor, step[k])
         if k > 0:
             _fill(model, inverse, k)
-            _eliminate_full(beside[k], inverse[k - 1], step[k - 1], model.product, factor, step[k])
+            _eliminate_full(filled[k], inverse[k - 1], step[k - 1], model.product, factor, step[k])
         if k > 1:
             _eliminate_diagonal(far[k], inverse[k - 2], step[k - 2], factor, step[k])
         if not cholesky(factor):
@@ -100,7 +100,7 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
         for a in range(n):
             if k + 1 < knots:
                 for b in range(n):
-                    step[k, a] -= beside[k + 1, b, a] * step[k + 1, b]
+                    step[k, a] -= filled[k + 1, b, a] * step[k + 1, b]
             if k + 2 < knots:
                 step[k, a] -= far[k + 2, a] * step[k + 2, a]
         multiply(inverse[k], factor, step[k])
@@ -110,32 +110,32 @@ def pentadiagonal_step(model, exact, damping, inverse, factor, step):
 @inlined
 def _fill(model, inverse, k):
     """The block next to the diagonal in row ``k``, behind the elimination of the knot two before."""
-    far, beside = model.far, model.beside
+    far, filled = model.far, model.filled
     n = far.shape[1]
     for a in range(n):
         for b in range(n):
             total = -model.coupling[k, a] if a == b else 0.0
             if k > 1:
                 for c in range(n):
-                    total -= far[k, a] * inverse[k - 2, a, c] * beside[k - 1, b, c]
-            beside[k, a, b] = total
+                    total -= far[k, a] * inverse[k - 2, a, c] * filled[k - 1, b, c]
+            filled[k, a, b] = total
 
 
 @inlined
-def _eliminate_full(beside, inverse, rhs_before, product, pivot, rhs):
+def _eliminate_full(filled, inverse, rhs_before, product, pivot, rhs):
     """Eliminates the knot before likewise, by a full block; ``product`` is scratch. Shapes (n, n)."""
     n = rhs.shape[0]
     for a in range(n):
         for b in range(n):
             total = 0.0
             for c in range(n):
-                total += beside[a, c] * inverse[c, b]
+                total += filled[a, c] * inverse[c, b]
             product[a, b] = total
             rhs[a] -= total * rhs_before[b]
         for b in range(a + 1):
             total = 0.0
             for c in range(n):
-                total += product[a, c] * beside[b, c]
+                total += product[a, c] * filled[b, c]
             pivot[a, b] -= total
 
 

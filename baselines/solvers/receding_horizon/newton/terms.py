@@ -206,7 +206,7 @@ class Smoothed(NamedTuple):
 
 
 @inlined
-def smoothed(u, weight, mu):
+def smooth(u, weight, mu):
     """φ(u) for a weight w and a barrier parameter μ > 0; gives a :class:`Smoothed`."""
     scaled, two = weight * u, 2.0 * mu
     root = math.sqrt(scaled * scaled + two * two)
@@ -230,7 +230,7 @@ def primal_dual_curvature(here, weight, multiplier):
 
 
 @inlined
-def trusted(multiplier, here, weight):
+def clip_multiplier(multiplier, here, weight):
     """The λ nearest to the one given for which λ and w - λ are not far from φ'."""
     rest = weight - here.gradient
     low = max(here.gradient / TRUSTED, weight - TRUSTED * rest)
@@ -255,15 +255,15 @@ class Bounded(NamedTuple):
 @inlined
 def one_side(barriers, k, i, side, u, weight, mu, advance):
     """One bound; gives a :class:`Bounded`. λ follows from the primal-dual equations of this step."""
-    here = smoothed(u, weight, mu)
+    here = smooth(u, weight, mu)
     multiplier = here.gradient
     if advance >= 0.0:
         multiplier = barriers[k, i, side, MULTIPLIER]
         if advance > 0.0:
-            told = barriers[k, i, side, GRADIENT] - multiplier
+            missing = barriers[k, i, side, GRADIENT] - multiplier
             moved = u - barriers[k, i, side, BEYOND]
-            multiplier += advance * told + barriers[k, i, side, CURVATURE] * moved
-        multiplier = trusted(multiplier, here, weight)
+            multiplier += advance * missing + barriers[k, i, side, CURVATURE] * moved
+        multiplier = clip_multiplier(multiplier, here, weight)
     curvature = primal_dual_curvature(here, weight, multiplier)
     barriers[k, i, side, MULTIPLIER] = multiplier
     barriers[k, i, side, GRADIENT] = here.gradient

@@ -101,7 +101,7 @@ class QuadraticModel(NamedTuple):
         second: Second-order part of the Hessian: Σ gradient_i ∂²error_i, lower triangles. Shape (K, n, n).
         coupling: The block between a knot and the one before is diagonal: its negative. Shape (K, n).
         far: The block between a knot and the one two before, diagonal as well. Shape (K, n).
-        beside: Scratch of :mod:`newton_step`: blocks next to the diagonal, filled up. Shape (K, n, n).
+        filled: Scratch of :mod:`newton_step`: blocks next to the diagonal, filled up. Shape (K, n, n).
         product: Scratch likewise. Shape (n, n).
     """
 
@@ -110,7 +110,7 @@ class QuadraticModel(NamedTuple):
     second: Floats
     coupling: Floats
     far: Floats
-    beside: Floats
+    filled: Floats
     product: Floats
 
 

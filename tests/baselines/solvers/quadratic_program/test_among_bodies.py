@@ -41,7 +41,7 @@ def test_a_pair_can_brake_before_it_reaches_the_clearance():
         assert distance >= 0.005
 
 
-BESIDE = Box("box", [0.12, 0.21, 0.62], [0.1, 0.1, 0.1])
+NEARBY = Box("box", [0.12, 0.21, 0.62], [0.1, 0.1, 0.1])
 
 
 def test_keeps_clear_of_a_box_that_comes():
@@ -58,7 +58,7 @@ def test_keeps_clear_of_a_box_that_comes():
 
 @pytest.mark.parametrize("name", ["qp", "null_space"])
 def test_a_batch_is_its_rows(name):
-    scenario = clear_scenario((BESIDE,))
+    scenario = clear_scenario((NEARBY,))
     policy, rng = baselines.make(name, scenario), np.random.default_rng(0)
     seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
     rows = [{**seen, "q": seen["q"] + 0.02 * rng.normal(size=7)} for _ in range(5)]
@@ -89,7 +89,7 @@ def test_slow_joints_give_way_like_others():
 
 
 def test_null_space_leads_away():
-    scenario = clear_scenario((BESIDE,))
+    scenario = clear_scenario((NEARBY,))
     seen, _ = ikgym.RedundantIKEnv(scenario).reset(seed=0)
     policy = baselines.make("null_space", scenario, secondary_gain=0.0, repulsion=0.1)
     action = policy.predict(seen)[0]
@@ -97,12 +97,12 @@ def test_null_space_leads_away():
     unit = scenario.dt * scenario.velocity_limit * (action.astype(float) - still)
     arm, q = scenario.arm, seen["q"]
     away = 1e-3 * unit / np.linalg.norm(unit)
-    assert arm.clearance(q + away, (BESIDE,))[0] > arm.clearance(q, (BESIDE,))[0]
+    assert arm.clearance(q + away, (NEARBY,))[0] > arm.clearance(q, (NEARBY,))[0]
     np.testing.assert_allclose(arm.jacobian(q) @ away, 0.0, atol=1e-6)
 
 
 def test_numbers_out_of_range():
-    scenario = clear_scenario((BESIDE,))
+    scenario = clear_scenario((NEARBY,))
     for settings in ({"influence": 0.004}, {"clearance": -1.0}, {"repulsion": 2.0 / scenario.dt}):
         with pytest.raises(InvalidInputError):
             baselines.make("qp", scenario, **settings)

@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 
 import ikgym
 from baselines.solvers.quadratic_program.box_minimum import box_minimum
-from baselines.solvers.quadratic_program.path_memory import moved, moves_around, remember
+from baselines.solvers.quadratic_program.path_memory import interpolate_motion, moves_around, remember
 from baselines.solvers.quadratic_program.path_speed import path_speed
 from baselines.solvers.quadratic_program.program import STILL, TAKEN_ON, curvature, goal_along_path
 from baselines.status import Status
@@ -72,7 +72,7 @@ def test_the_reference_between_samples_is_a_spline_through_them():
         slopes = np.gradient(around, axis=0)
         spline = CubicHermiteSpline(np.arange(len(around)) - min(first, 1), around, slopes)
         for part in (0.0, 0.3, 1.0, 1.7, 2.0):
-            moved(moves, part, out)
+            interpolate_motion(moves, part, out)
             np.testing.assert_allclose(path[first] + out, spline(part), rtol=0, atol=1e-12)
 
 

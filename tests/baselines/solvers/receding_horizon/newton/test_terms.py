@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
-from baselines.solvers.receding_horizon.newton.terms import augmented_term, primal_dual_curvature, smoothed
+from baselines.solvers.receding_horizon.newton.terms import augmented_term, primal_dual_curvature, smooth
 from ikgym.kernels.jit import kernel
 
 LOW, HIGH = -0.7, 1.2
@@ -71,13 +71,13 @@ def test_value_is_the_least_over_what_lies_above(u, weight, mu):
         return weight * t - mu * math.log(weight * t / mu) - mu * math.log(weight * (t - u) / mu)
 
     best = minimize_scalar(lambda log: over(math.exp(log)), bounds=(-20.0, 5.0), method="bounded").fun
-    assert smoothed(u, weight, mu).value == pytest.approx(best, rel=1e-6, abs=1e-6)
+    assert smooth(u, weight, mu).value == pytest.approx(best, rel=1e-6, abs=1e-6)
 
 
 @PLACES
 def test_derivatives_against_central_differences(u):
     weight, mu, h = 3.0, 0.2, 1e-5
-    here, low, high = (smoothed(at, weight, mu) for at in (u, u - h, u + h))
+    here, low, high = (smooth(at, weight, mu) for at in (u, u - h, u + h))
     assert here.gradient == pytest.approx((high.value - low.value) / (2.0 * h), abs=1e-8)
     # With the multiplier that the barrier itself has, the primal-dual curvature is its second derivative.
     curvature = primal_dual_curvature(here, weight, here.gradient)
