@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from baselines.solvers.wrappers import full_orientation
 from ikgym.exceptions import InvalidInputError
 from ikgym.kernels.jit import kernel
 from ikgym.scenarios import Preview
-from ikgym.validation import FloatArray, flag, whole_number
+from ikgym.validation import Bounds, Flag, FloatArray
 
 #: The agents that come with the package.
 FOLDER = pathlib.Path(__file__).parents[1] / "data" / "agents"
@@ -57,7 +57,7 @@ class LearnedPolicy(SolverPolicy):
             output of the network is held in between, with feedback in every step.
     """
 
-    interval: int | None = None
+    interval: Annotated[int, Bounds(at_least=1)] | None = None
     #: The agent in the file.
     file: AgentFile = dataclasses.field(init=False, repr=False)
     #: The problem as the agent sees it: with whole poses if it was trained on them.
@@ -76,7 +76,7 @@ class LearnedPolicy(SolverPolicy):
             any_arm: Whether it may control an arm that it was not trained for.
 
         Raises:
-            InvalidInputError: The scenario does not fit the agent, or the interval is no whole number from 1.
+            InvalidInputError: The scenario does not fit the agent.
         """
         skew = (file.about["task"]["name"], self.problem.task.name) == ("pose", "skew")
         seen = full_orientation.full_problem(self.problem) if skew else self.problem
@@ -92,11 +92,8 @@ class LearnedPolicy(SolverPolicy):
                 f"Agent {file.source}: expected a network from {needed[0]} features to {needed[1]} outputs, got "
                 f"{shape[0]} and {shape[1]}."
             )
-        trained = processing.interval
-        steps = whole_number("interval", trained if self.interval is None else self.interval, at_least=1)
         limits = seen.limits if processing.bounded and seen.model.limited else None
-        for field, value in {"file": file, "seen": seen, "limits": limits, "interval": steps}.items():
-            object.__setattr__(self, field, value)
+        self._settle(file=file, seen=seen, limits=limits, interval=self.interval or processing.interval)
 
     @property
     def preview(self) -> Preview:
@@ -153,9 +150,9 @@ class Agent(LearnedPolicy):
         InvalidInputError: A parameter is refused, or the scenario does not fit the agent.
     """
 
-    path: str = ""
+    path: str | os.PathLike[str] = ""
     hash: str | None = None
-    any_arm: bool = False
+    any_arm: Flag = False
     given: dataclasses.InitVar[AgentFile | None] = dataclasses.field(default=None, kw_only=True)
 
     name: ClassVar[str] = "agent"
@@ -163,11 +160,10 @@ class Agent(LearnedPolicy):
     decisive: ClassVar[tuple[str, ...]] = ("path",)
 
     def __post_init__(self, given: AgentFile | None) -> None:
-        flag("any_arm", self.any_arm)
+        super().__post_init__()
         file = given or agent_at(self.path, self.hash)
         self._take(file, any_arm=self.any_arm)
-        object.__setattr__(self, "path", os.fspath(self.path))
-        object.__setattr__(self, "hash", file.digits)
+        self._settle(path=os.fspath(self.path), hash=file.digits)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -189,6 +185,7 @@ class AgentAlone(LearnedPolicy):
     name: ClassVar[str] = "agent_alone"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         file = agent_at(FOLDER / f"{self.name}.safetensors", self.hash)
         self._take(dataclasses.replace(file, source=self.name))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import errno
 import json
 import tempfile
 
@@ -21,7 +20,7 @@ from baselines.files import locked
 from baselines.training.options import Rewards
 from baselines.training.rewards import make, train
 from baselines.training.zoo import ALGORITHMS, read_settings
-from ikgym import files, rl
+from ikgym import rl
 from ikgym.exceptions import IkgymError
 from ikgym.sb3 import make_vec
 
@@ -247,25 +246,6 @@ def test_errors_of_the_library_are_one_line(settings, tmp_path, capsys):
     error = capsys.readouterr().err
     assert "settings: ppo refuses" in error
     assert len(error.splitlines()) == 1
-
-
-@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
-def test_a_full_disk_ends_a_run_with_a_message_and_the_command_begins_it_again(settings, tmp_path, capsys, monkeypatch):
-    write = files.write
-
-    def write_if_there_is_space(file, content):
-        if file.name == "model.zip":
-            raise OSError(errno.ENOSPC, "No space left on device")
-        write(file, content)
-
-    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--episodes", "2", "--out", str(tmp_path)]
-    with monkeypatch.context() as patched:
-        patched.setattr(files, "write", write_if_there_is_space)
-        assert main(words) == 2
-    file = tmp_path / "seed-0" / "model.zip"
-    assert capsys.readouterr().err == f"error: Cannot write {file}: No space left on device.\n"
-    assert not (tmp_path / "seed-0" / "run.json").exists()
-    assert main(words) == 0
 
 
 @pytest.mark.parametrize("settings", ["ppo"], indirect=True)
