@@ -49,18 +49,18 @@ class Wrapper(SolverPolicy, abc.ABC):
         """The wrapper's memory, then that of the inner policy."""
         return *self.own_memory(rows), *(() if self.inner is None else self.inner.initial_memory(rows))
 
-    def restart(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
-        """See :meth:`SolverPolicy.restart`; the inner policy keeps its memory."""
+    def begin_episodes(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+        """See :meth:`SolverPolicy.begin_episodes`; the inner policy keeps its memory."""
         outer, inside = self.split(memory)
-        fresh = () if self.inner is None else self.inner.restart(inside, rows)
-        return *self.restart_own(outer, rows), *fresh
+        fresh = () if self.inner is None else self.inner.begin_episodes(inside, rows)
+        return *self.begin_own_episodes(outer, rows), *fresh
 
     def recall(self, memory: Memory, qdot: FloatArray, change: FloatArray | None = None) -> Memory:
         """See :meth:`SolverPolicy.recall`; the inner policy's command."""
         outer, inside = self.split(memory)
         return *outer, *(() if self.inner is None else self.inner.recall(inside, qdot, change))
 
-    def restart_own(self, outer: Any, rows: npt.NDArray[np.bool_]) -> Memory:
+    def begin_own_episodes(self, outer: Any, rows: npt.NDArray[np.bool_]) -> Memory:
         """The wrapper's memory, cleared where an episode begins."""
         return replace_rows(outer, self.own_memory(len(rows)), rows)
 

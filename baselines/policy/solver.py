@@ -249,7 +249,7 @@ class SolverPolicy(Frozen, abc.ABC):
         memory = read_memory(state)
         return self._with_names(memory[:-1] if self.remembers_command else memory)
 
-    def restart(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
+    def begin_episodes(self, memory: Memory, rows: npt.NDArray[np.bool_]) -> Memory:
         """A memory, cleared in the rows where an episode begins. Shape (B,)."""
         return replace_rows(memory, self.initial_memory(len(rows)), rows) if memory else memory
 
@@ -286,7 +286,7 @@ class SolverPolicy(Frozen, abc.ABC):
             memory = check_state(self.name, state, self._signature(rows), rows)
         if starting is None or not starting.any():
             return memory
-        return self.restart(memory, np.broadcast_to(starting, (rows,)))
+        return self.begin_episodes(memory, np.broadcast_to(starting, (rows,)))
 
     @functools.cached_property
     def _last(self) -> list[Memory | None]:

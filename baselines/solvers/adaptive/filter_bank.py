@@ -115,9 +115,9 @@ class ArmFilters(Corrected, abc.ABC):
         since = np.zeros(rows, np.int64)
         return BankMemory(*self.sensors(rows), since, estimates, covariances, weights, surprise, quiet)
 
-    def restart_own(self, outer: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
-        """See :meth:`Wrapper.restart_own`; the arm is the same one as before, if it is kept."""
-        fresh = BankMemory(*super().restart_own(outer, rows))
+    def begin_own_episodes(self, outer: BankMemory, rows: npt.NDArray[np.bool_]) -> BankMemory:
+        """See :meth:`Wrapper.begin_own_episodes`; the arm is the same one as before, if it is kept."""
+        fresh = BankMemory(*super().begin_own_episodes(outer, rows))
         kept = outer._replace(before=fresh.before, age=fresh.age, rest=fresh.rest)
         return kept if self.keep else fresh
 

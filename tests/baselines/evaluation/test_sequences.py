@@ -29,7 +29,7 @@ class Counting(SolverPolicy):
     def memory(self, rows):
         return (np.zeros(rows),)
 
-    def restart(self, memory, rows):
+    def begin_episodes(self, memory, rows):
         return (memory[0] + rows,)
 
     def solve(self, batch, memory):
