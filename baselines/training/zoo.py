@@ -1,6 +1,7 @@
 """Settings of the algorithms in the format of rl-zoo3, turned into arguments.
 
-Names are checked here. Values are left to Stable-Baselines3, whose errors :mod:`baselines.training.rewards` passes on.
+Names and bounds are checked here. All else is left to Stable-Baselines3, whose errors
+:mod:`baselines.training.rewards` passes on.
 """
 
 from __future__ import annotations
@@ -36,6 +37,14 @@ MOST_BYTES, LEVELS, ELEMENTS = 2**17, 3, 100
 #: Arguments of the algorithms that are no settings: a run states them, has no use for them, or no text can.
 OTHERS = {"self", "policy", "env", "action_noise", "rollout_buffer_class", "replay_buffer_class", "stats_window_size"}
 OTHERS |= {"tensorboard_log", "verbose", "seed", "device", "_init_setup_model"}
+#: Bounds of numbers with which the library would train in silence, or for ever.
+BOUNDS: dict[str, dict[str, float]] = {
+    **{name: {"at_least": 0.0, "at_most": 1.0} for name in ("gamma", "gae_lambda")},
+    "tau": {"above": 0.0, "at_most": 1.0},
+    **{name: {"above": 0.0} for name in ("learning_rate", "clip_range", "clip_range_vf", "max_grad_norm", "target_kl")},
+    **{name: {"at_least": 0.0} for name in ("ent_coef", "vf_coef", "target_policy_noise", "target_noise_clip")},
+    **{name: {"at_least": 1.0} for name in ("n_steps", "n_epochs", "batch_size", "buffer_size", "train_freq")},
+}
 
 
 def read_settings(config: Rewards) -> dict[str, Any]:
@@ -85,7 +94,7 @@ def arguments(algorithm: str, settings: Mapping[str, Any], joints: int) -> dict[
 
     Raises:
         UnknownNameError: There is no such setting.
-        InvalidInputError: A text or the noise is refused.
+        InvalidInputError: A text or the noise is refused, or a number is out of its range.
     """
     kind = ALGORITHMS[algorithm]
     names = inspect.signature(kind.__init__).parameters
@@ -106,12 +115,15 @@ def arguments(algorithm: str, settings: Mapping[str, Any], joints: int) -> dict[
 
 def _argument(name: str, value: Any) -> Any:
     """A value as rl-zoo3 reads it: ``lin_X`` falls from X to 0, a list is a pair, and ``dict(…)`` is a table."""
+    first = value[0] if name == "train_freq" and isinstance(value, list) and value else value
+    if name in BOUNDS and isinstance(first, int | float):
+        number(name, first, **BOUNDS[name])
     if isinstance(value, str) and value.startswith("lin_"):
         try:
-            first = number(name, float(value.removeprefix("lin_")), above=0.0)
+            highest = number(name, float(value.removeprefix("lin_")), above=0.0)
         except (InvalidInputError, ValueError):
             raise InvalidInputError(f"{name}: expected lin_ and a number above 0, got {value!r}.") from None
-        return functools.partial(operator.mul, first)  # of the share that remains
+        return functools.partial(operator.mul, highest)  # of the share that remains
     if isinstance(value, str) and value.startswith("dict("):
         return _parse(name, value)
     return tuple(value) if isinstance(value, list) else value

@@ -219,6 +219,10 @@ def test_other_files_of_settings_are_refused(content, message, tmp_path):
 
 
 @pytest.mark.parametrize(("algorithm", "setting", "message"), [
+    ("ppo", {"gamma": -1}, "gamma: expected a finite number from 0 to 1, got -1.0."),
+    ("ppo", {"clip_range": -1}, "clip_range: expected a finite number above 0, got -1.0."),
+    ("sac", {"tau": 0}, "tau: expected a finite number above 0 and of at most 1, got 0.0."),
+    ("sac", {"train_freq": [0, "step"]}, "train_freq: expected a finite number of at least 1, got 0.0."),
     ("ppo", {"clip_range": "lin_-1"}, "clip_range: expected lin_ and a number above 0, got 'lin_-1'."),
     ("ppo", {"tensorboard_log": "logs"}, "no setting 'tensorboard_log' of ppo. Available: learning_rate, "),
     ("ppo", {"normalize": True}, "no setting 'normalize' of ppo. Did you mean 'normalize_advantage'"),
