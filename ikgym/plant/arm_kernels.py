@@ -80,6 +80,8 @@ class Ranges(NamedTuple):
 class Arms(NamedTuple):
     """N drawn arms, as :class:`ikgym.kernels.kinematics.Chain` has them: each without its payload, then with it.
 
+    One arm, so that caches hold it, where all rows have the same.
+
     Attributes:
         offsets: Shape (N, 2, n, 3).
         axes: Shape (N, 2, n, 3).

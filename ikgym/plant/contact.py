@@ -165,7 +165,7 @@ def turn_bodies(spread, keys, rows, calibration, load, axes, links, ends, out):
         rows: Which rows they are. Shape (k,).
         calibration: Factors of zeros. Shape (k,).
         load: Factors of the payload. Shape (k,).
-        axes: Axes of the drawn arms. Shape (N, 2, n, 3).
+        axes: Axes of the drawn arms. Shape (N or 1, 2, n, 3).
         links: Links of the b bodies. Shape (b,).
         ends: Both ends of the bodies in the frames of the links, in [m]. Shapes (b, 3).
         out: Receives both ends. Shapes (N, 2, b, 3).
@@ -182,5 +182,5 @@ def turn_bodies(spread, keys, rows, calibration, load, axes, links, ends, out):
                         zero = zero_of(spread, of_zeros, j, loaded, calibration[i], load[i])
                         if zero != 0.0 and not spread.prismatic[j]:
                             s, half = math.sin(zero), math.sin(0.5 * zero)
-                            axis = axes[rows[i], loaded, j]
+                            axis = axes[rows[i] % axes.shape[0], loaded, j]
                             turn((axis[0], axis[1], axis[2]), s, 2.0 * half * half, point)

@@ -9,9 +9,20 @@ from ikgym.kernels.random_numbers import uniform
 
 
 @inlined
-def remembered(ring, row, step, j):
-    """The command of joint ``j`` in an earlier step, 0 before the episode. ``ring`` has shape (N, D, n)."""
-    return ring[row, step % ring.shape[1], j] if step >= 0 else 0.0
+def remembered(ring, row, now, place, back, j):
+    """A command of some steps ago, 0 before the episode.
+
+    Args:
+        ring: Commands of the last steps. Shape (N, D, n).
+        row: The arm.
+        now: Steps made.
+        place: That of this step in the ring, ``now`` mod D: a division takes longer than all else here.
+        back: Steps ago, less than D.
+        j: The joint.
+    """
+    if back > now:
+        return 0.0
+    return ring[row, place - back if back <= place else place - back + ring.shape[1], j]
 
 
 @inlined

@@ -101,7 +101,7 @@ class PlantRows:
             plant.pose_delay,
             plant.pose_missing,
         )
-        self.arms = self._draws.blank(rows)
+        self.arms = self._draws.blank(rows if plant.draws_arm else 1)
         self.context = np.zeros((rows, len(plant.context)))
         self.state = PlantState(
             keys=np.zeros((rows, STREAMS), dtype=np.uint64),
@@ -168,7 +168,7 @@ class PlantRows:
             if self._plant.draws_arm:
                 self._draw(rows[part], of_arms[part])
             if jogged is not None:
-                offsets, axes, tool, tool_rotation = (array[rows[part], 0] for array in self.arms)
+                offsets, axes, tool, tool_rotation = (array[rows[part] % len(array), 0] for array in self.arms)
                 q[part] = jogged(q[part], Chain(offsets, axes, self.drives.prismatic, tool, tool_rotation))
 
         if self._plant.draws_arm or jogged is not None:
@@ -177,7 +177,7 @@ class PlantRows:
     def _draw(self, rows: Integers, keys: Keys) -> None:
         """Draws the arms of some rows, their drives and sensors, by their keys. Shapes (k,)."""
         numbers, context = self._draws.numbers(keys)
-        self._draws.arms(keys, rows, numbers, self.arms)
+        self._draws.arms(keys, rows % len(self.arms.offsets), numbers, self.arms)
         if self.contacts is not None:
             self._draws.bodies(keys, rows, numbers, self.arms.axes, (self.contacts.starts, self.contacts.ends))
         if context.size:

@@ -213,12 +213,13 @@ def _rows(
         else:
             k = state.step[row]
             loaded = 1 if k >= drives.payload_step else 0
+            drawn = row if arms.offsets.shape[0] > 1 else 0
             arm = Chain(
-                arms.offsets[row, loaded],
-                arms.axes[row, loaded],
+                arms.offsets[drawn, loaded],
+                arms.axes[drawn, loaded],
                 drives.prismatic,
-                arms.tool[row, loaded],
-                arms.tool_rotation[row, loaded],
+                arms.tool[drawn, loaded],
+                arms.tool_rotation[drawn, loaded],
             )
             true_q, true_pose = more.true_q, more.true_pose
             if contacts is not None:
@@ -279,14 +280,16 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
     dt, velocity_limit, limits = constants.dt, constants.velocity_limit, constants.limits
     q, qdot, limited = state.q, state.qdot, constants.limits.shape[0] > 0
     n, now = q.shape[1], state.step[row]
+    place = now % plant.commands.shape[1] if len(plant) > 0 else 0
     for j in range(n):
         applied = to_command(state.actions[row, j], velocity_limit[j], clipped, row)
         if len(plant) > 0:
-            plant.commands[row, now % plant.commands.shape[1], j] = applied
-            arrived = now - plant.delay[row, j]
-            applied = remembered(plant.commands, row, arrived, j)
+            plant.commands[row, place, j] = applied
+            delay = plant.delay[row, j]
+            applied = remembered(plant.commands, row, now, place, delay, j)
             if drives.fraction[j] != 0.0:
-                applied += drives.fraction[j] * (remembered(plant.commands, row, arrived - 1, j) - applied)
+                before = remembered(plant.commands, row, now, place, delay + 1, j)
+                applied += drives.fraction[j] * (before - applied)
         slack = SLACK * velocity_limit[j]
         if limited:
             applied = limit_command(limits, j, applied, qdot[row, j], slack, at_limit, row)
@@ -317,8 +320,9 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
 def _recall(limits, commands, row, now, out):
     """Shows the last commands within the velocity limit. ``out`` has shape (N, h, n)."""
     for i in range(out.shape[1]):
+        place = (now - 1) % commands.shape[1]
         for j in range(out.shape[2]):
-            command = remembered(commands, row, now - 1 - i, j)
+            command = remembered(commands, row, now - 1, place, i, j)
             out[row, i, j] = clip(command, limits[FASTEST, j]) if limits.shape[0] > 0 else command
 
 
