@@ -107,13 +107,9 @@ def draw_arms(spread, keys, rows, calibration, load, arms):
         load: Factors of the payload. Shape (k,).
         arms: An :class:`Arms`, which receives them.
     """
-    payload = np.any(spread.payload)
     for i in range(keys.shape[0]):
-        _draw_arm(spread, keys[i], rows[i], 0, calibration[i], load[i], arms)
-        if payload:
-            _draw_arm(spread, keys[i], rows[i], 1, calibration[i], load[i], arms)
-        else:
-            _copy_arm(rows[i], arms)
+        for loaded in range(2):
+            _draw_arm(spread, keys[i], rows[i], loaded, calibration[i], load[i], arms)
 
 
 @uncounted
@@ -141,15 +137,6 @@ def zero_of(spread, of_zeros, j, loaded, calibration, load):
     if spread.zero[j] != 0.0:
         zero = calibration * spread.zero[j] * normal(of_zeros, np.uint64(j))
     return zero + load * spread.payload[j] if loaded == 1 else zero
-
-
-@inlined
-def _copy_arm(row, arms):
-    """The arm of a row with a payload, where there is none."""
-    _copy(arms.offsets[row, 0], arms.offsets[row, 1])
-    _copy(arms.axes[row, 0], arms.axes[row, 1])
-    _copy(arms.tool[row, :1], arms.tool[row, 1:])
-    _copy(arms.tool_rotation[row, 0], arms.tool_rotation[row, 1])
 
 
 @inlined

@@ -74,7 +74,9 @@ def place_of_boxes(contacts, row, step):
 
 
 @inlined
-def _smallest(contacts, chain, shapes, row, q, boxes, found):
+def _smallest(contacts, chain, row, loaded, q, boxes, found):
+    starts, ends = contacts.starts[row, loaded], contacts.ends[row, loaded]
+    shapes = Shapes(contacts.links, starts, ends, contacts.radii, contacts.sizes, contacts.pairs)
     place(chain, shapes, q, contacts.joints[row], contacts.placed[row])
     return smallest(shapes, boxes, contacts.checked, contacts.placed[row], contacts.core[row], found)
 
@@ -91,11 +93,9 @@ def measure(contacts, chain, row, loaded, step, q):
         step: Steps made.
         q: Joint coordinates in [rad] or [m]. Shape (n,).
     """
-    starts, ends = contacts.starts[row, loaded], contacts.ends[row, loaded]
-    shapes = Shapes(contacts.links, starts, ends, contacts.radii, contacts.sizes, contacts.pairs)
     contacts.pair[row, 0] = contacts.pair[row, 1] = -1
     table, at = place_of_boxes(contacts, row, step)
-    contacts.distance[row] = _smallest(contacts, chain, shapes, row, q, contacts.boxes[table, at], contacts.pair[row])
+    contacts.distance[row] = _smallest(contacts, chain, row, loaded, q, contacts.boxes[table, at], contacts.pair[row])
 
 
 @uncounted
@@ -114,14 +114,12 @@ def touches(contacts, chain, row, loaded, step, q):
         step: Steps made, this one included.
         q: Joint coordinates after the step in [rad] or [m]. Shape (n,).
     """
-    starts, ends = contacts.starts[row, loaded], contacts.ends[row, loaded]
-    shapes = Shapes(contacts.links, starts, ends, contacts.radii, contacts.sizes, contacts.pairs)
     way = _way(contacts, row, step, q)
     last, before, between = contacts.distance[row], contacts.before[row], contacts.between[row]
     pair = contacts.pair[row]
     pair[0] = pair[1] = -1
     table, at = place_of_boxes(contacts, row, step)
-    contacts.distance[row] = distance = _smallest(contacts, chain, shapes, row, q, contacts.boxes[table, at], pair)
+    contacts.distance[row] = distance = _smallest(contacts, chain, row, loaded, q, contacts.boxes[table, at], pair)
     share = 0.0
     while distance > TOUCHING and last > TOUCHING:
         if last + distance > way * (1.0 - share):
@@ -130,7 +128,7 @@ def touches(contacts, chain, row, loaded, step, q):
         for j in range(q.shape[0]):
             between[j] = before[j] + share * (q[j] - before[j])
         _move_boxes(contacts.boxes[table], at, share, contacts.moving[row])
-        last = _smallest(contacts, chain, shapes, row, between, contacts.moving[row], pair)
+        last = _smallest(contacts, chain, row, loaded, between, contacts.moving[row], pair)
     return True
 
 

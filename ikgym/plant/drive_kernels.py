@@ -9,7 +9,7 @@ from ikgym.kernels.random_numbers import uniform
 
 
 @inlined
-def remembered(ring, row, now, place, back, j):
+def recall(ring, row, now, place, back, j):
     """A command of some steps ago, 0 before the episode.
 
     Args:
@@ -26,7 +26,7 @@ def remembered(ring, row, now, place, back, j):
 
 
 @inlined
-def disturbed(velocity, bias, noise, key, counter):
+def disturb(velocity, bias, noise, key, counter):
     """A velocity with its bias and its noise, each of them left out where it is 0."""
     if bias != 0.0:
         velocity += bias
@@ -36,7 +36,7 @@ def disturbed(velocity, bias, noise, key, counter):
 
 
 @inlined
-def engaged(play, row, j, backlash, way):
+def engage(play, row, j, backlash, way):
     """Motion of the joint when its drive moves by ``way`` within the backlash, all of it without one.
 
     Args:
@@ -54,7 +54,7 @@ def engaged(play, row, j, backlash, way):
 
 
 @inlined
-def filtered(drive, row, j, lag, velocity):
+def lag_behind(drive, row, j, lag, velocity):
     """The velocity of a drive behind a first-order loop.
 
     Args:
@@ -69,7 +69,7 @@ def filtered(drive, row, j, lag, velocity):
 
 
 @inlined
-def shaped(coefficients, past, row, j, command):
+def respond(coefficients, past, row, j, command):
     """The velocity of a drive of low order, see :attr:`ikgym.Plant.drive`.
 
     Args:
@@ -89,7 +89,7 @@ def shaped(coefficients, past, row, j, command):
 
 
 @inlined
-def swung(free, swing, row, j, way, dt):
+def swing_link(free, swing, row, j, way, dt):
     """Motion of a link behind a spring, whose other end moves by ``way`` at a constant velocity.
 
     The velocity changes between two steps, which gives the spring's deflection a jump of its rate; within a step the

@@ -22,7 +22,7 @@ class Response(NamedTuple):
 
     Attributes:
         coefficients: See :attr:`Plant.drive`. Shape (n, 7), or (0, 7) without.
-        free: See :func:`ikgym.plant.drive_kernels.swung`. Shape (n, 4), or (0, 4) without resonances.
+        free: See :func:`ikgym.plant.drive_kernels.swing_link`. Shape (n, 4), or (0, 4) without resonances.
         steady: Velocity of a drive of low order after a long time of a command, in parts of it. Shape (n,).
     """
 

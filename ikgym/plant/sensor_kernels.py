@@ -9,6 +9,7 @@ import numpy as np
 from ikgym.kernels import tasks as task_kernels
 from ikgym.kernels.jit import inlined, inner
 from ikgym.kernels.random_numbers import normal, share
+from ikgym.plant.arm_kernels import turn
 
 # The streams of the key of an episode's noises. The first is the key itself.
 NOISE, Q_NOISE, POSITION, ROTATION, MISSING = range(5)
@@ -109,7 +110,7 @@ def blur(distance, angle, keys, kind, step, rotation, position):
         for c in range(3):
             position[c] += distance * normal(keys[POSITION], np.uint64(first + c))
     if angle != 0.0 and kind != task_kernels.POSITION:
-        turn(
+        _turn(
             angle * normal(keys[ROTATION], np.uint64(first)),
             angle * normal(keys[ROTATION], np.uint64(first + 1)),
             angle * normal(keys[ROTATION], np.uint64(first + 2)),
@@ -118,16 +119,11 @@ def blur(distance, angle, keys, kind, step, rotation, position):
 
 
 @inlined
-def turn(wx, wy, wz, rotation):
+def _turn(wx, wy, wz, rotation):
     """Turns an orientation by a rotation vector in place: Rodrigues' formula, without a division by the angle."""
-    square = wx * wx + wy * wy + wz * wz
-    theta = math.sqrt(square)
+    theta = math.sqrt(wx * wx + wy * wy + wz * wz)
     half = 0.5 * theta
     s = math.sin(theta) / theta if theta > 0.0 else 1.0
     v = 2.0 * (math.sin(half) / theta) ** 2 if theta > 0.0 else 0.5
     for c in range(3):
-        x, y, z = rotation[0, c], rotation[1, c], rotation[2, c]
-        cx, cy, cz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
-        rotation[0, c] = x + s * cx + v * (wy * cz - wz * cy)
-        rotation[1, c] = y + s * cy + v * (wz * cx - wx * cz)
-        rotation[2, c] = z + s * cz + v * (wx * cy - wy * cx)
+        turn((wx, wy, wz), s, v, rotation[:, c])

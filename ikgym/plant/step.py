@@ -16,7 +16,7 @@ from ikgym.kernels.outcome import OBSTACLE, more_parts, more_size, parts, size
 from ikgym.kernels.simulation import Constants, Floats, Integers, State, show_row, to_command
 from ikgym.kernels.tasks import error_size
 from ikgym.plant.contact import measure, place_of_boxes, touches
-from ikgym.plant.drive_kernels import counter_of, disturbed, engaged, filtered, hold, remembered, shaped, swung
+from ikgym.plant.drive_kernels import counter_of, disturb, engage, hold, lag_behind, recall, respond, swing_link
 from ikgym.plant.sensor_kernels import NOISE, measure_pose, measure_q
 
 _parts, _more_parts, _size, _more_size = expanded(parts), expanded(more_parts), inlined(size), inlined(more_size)
@@ -32,7 +32,7 @@ class Drives(NamedTuple):
         fraction: Part of a delay beyond whole steps. Shape (n,).
         coefficients: Of drives of low order, see :attr:`ikgym.Plant.drive`. Shape (n, 7), or (0, 7) without.
         gain: Factors of the velocities. Shape (n,).
-        free: See :func:`ikgym.plant.drive_kernels.swung`. Shape (n, 4), or (0, 4) without resonances.
+        free: See :func:`ikgym.plant.drive_kernels.swing_link`. Shape (n, 4), or (0, 4) without resonances.
         prismatic: True where a joint is prismatic. Shape (n,).
         payload_step: Steps made when the payload is taken up.
     """
@@ -69,8 +69,8 @@ class PlantState(NamedTuple):
         pose_every: Steps from one measurement of the pose to the next. Shape (N,).
         drive: Velocities of the drives in [rad/s] or [m/s]. Shape (N, n).
         play: How far drives are from the middle of their backlash, in [rad] or [m]. Shape (N, n).
-        past: Past of drives of low order, see :func:`ikgym.plant.drive_kernels.shaped`. Shape (N, n or 0, 6).
-        swing: See :func:`ikgym.plant.drive_kernels.swung`. Shape (N, n or 0, 3).
+        past: Past of drives of low order, see :func:`ikgym.plant.drive_kernels.respond`. Shape (N, n or 0, 6).
+        swing: See :func:`ikgym.plant.drive_kernels.swing_link`. Shape (N, n or 0, 3).
         commands: The last commands in [rad/s] or [m/s]; that of step k is number k mod D. Shape (N, D, n).
         q: The last measured joint coordinates; those of step k are number k mod Q. Shape (N, Q, n).
         pose: The last measured poses; the i-th is number i mod S. Shape (N, S, m).
@@ -234,7 +234,7 @@ def _rows(
         forward(arm, q[row], rotation, position)
         show_row(constants, cost, state, row, true_pose[row], (rotation, position, nominal, error), shown)
         if len(plant) > 0:
-            _recall(constants.limits, plant.commands, row, state.step[row], more.commands)
+            _show_commands(constants.limits, plant.commands, row, state.step[row], more.commands)
             _sense(sensors, plant, constants.kind, state, row, (rotation, position), shown, more)
 
 
@@ -286,9 +286,9 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
         if len(plant) > 0:
             plant.commands[row, place, j] = applied
             delay = plant.delay[row, j]
-            applied = remembered(plant.commands, row, now, place, delay, j)
+            applied = recall(plant.commands, row, now, place, delay, j)
             if drives.fraction[j] != 0.0:
-                before = remembered(plant.commands, row, now, place, delay + 1, j)
+                before = recall(plant.commands, row, now, place, delay + 1, j)
                 applied += drives.fraction[j] * (before - applied)
         slack = SLACK * velocity_limit[j]
         if limited:
@@ -296,17 +296,17 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
         velocity = applied
         if len(plant) > 0:
             if plant.lag[row, j] < 1.0:
-                velocity = filtered(plant.drive, row, j, plant.lag[row, j], applied)
+                velocity = lag_behind(plant.drive, row, j, plant.lag[row, j], applied)
             if drives.coefficients.shape[0] > 0:
-                velocity = shaped(drives.coefficients, plant.past, row, j, velocity)
+                velocity = respond(drives.coefficients, plant.past, row, j, velocity)
             velocity *= drives.gain[j]
             key = plant.keys[row, NOISE]
-            velocity = disturbed(velocity, drives.bias[j], drives.noise[j], key, counter_of(now, n, j))
+            velocity = disturb(velocity, drives.bias[j], drives.noise[j], key, counter_of(now, n, j))
         way = dt * velocity
         if len(plant) > 0:
-            way = engaged(plant.play, row, j, drives.backlash[j], way)
+            way = engage(plant.play, row, j, drives.backlash[j], way)
             if drives.free.shape[0] > 0:
-                way = swung(drives.free, plant.swing, row, j, way, dt)
+                way = swing_link(drives.free, plant.swing, row, j, way, dt)
         reached = q[row, j] + way  # Varga 2021, eq. 5
         if limited and not limits[LOWER, j] <= reached <= limits[UPPER, j]:
             reached, applied = stop_at_limit(limits, j, q[row, j], reached, dt)
@@ -317,12 +317,12 @@ def _move(constants, drives, state, plant, row, clipped, at_limit):
 
 
 @inlined
-def _recall(limits, commands, row, now, out):
+def _show_commands(limits, commands, row, now, out):
     """Shows the last commands within the velocity limit. ``out`` has shape (N, h, n)."""
     for i in range(out.shape[1]):
         place = (now - 1) % commands.shape[1]
         for j in range(out.shape[2]):
-            command = remembered(commands, row, now - 1, place, i, j)
+            command = recall(commands, row, now - 1, place, i, j)
             out[row, i, j] = clip(command, limits[FASTEST, j]) if limits.shape[0] > 0 else command
 
 
