@@ -8,13 +8,12 @@ from __future__ import annotations
 import inspect
 import re
 import shlex
-from collections.abc import Iterable
 
 import baselines
 import ikgym
 from baselines.cli.commands.policies import summary
 from baselines.evaluation import test_sets as sets
-from baselines.evaluation.table import markdown as results_table
+from baselines.evaluation.table import grid, markdown
 from baselines.registry import get
 from baselines.status import Status
 from docs.keeping import PAGES, lines
@@ -67,13 +66,6 @@ def statuses() -> list[tuple[str, ...]]:
 TABLES = {make.__name__: make for make in (tasks, splits, policies, statuses, test_sets)}
 
 
-def markdown(rows: Iterable[tuple[str, ...]]) -> str:
-    """A table, its first row the head."""
-    head, *body = rows
-    lines = ["| " + " | ".join(row) + " |" for row in (head, *body)]
-    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
-
-
 def csv_table(name: str, *words: str) -> str:
     """The table of a CSV file.
 
@@ -90,7 +82,7 @@ def csv_table(name: str, *words: str) -> str:
             rows.setdefault(tuple(line[column] for column in columns), dict(line))[line[across]] = line[cells]
         columns += dict.fromkeys(line[across] for line in kept)
         kept = [dict.fromkeys(columns) | row for row in rows.values()]
-    return results_table(kept, columns)
+    return markdown(kept, columns)
 
 
 def table(words: str) -> str:
@@ -98,7 +90,10 @@ def table(words: str) -> str:
     name, *rest = shlex.split(words)
     if name.startswith("results/"):
         return csv_table(name.removeprefix("results/").removesuffix(".csv"), *rest)
-    return claims() if name == "claims" else markdown(TABLES[name]())
+    if name == "claims":
+        return claims()
+    head, *body = TABLES[name]()
+    return grid(head, body, text=range(len(head)))
 
 
 def fill_in(text: str) -> str:

@@ -78,15 +78,10 @@ def parse(kind: type[T], arguments: Sequence[str], *, prog: str, description: st
     return options
 
 
-def varies(scenario: str | Scenario) -> bool:
-    """Whether the episodes of a scenario differ from reset to reset."""
-    found = scenarios.find(scenario)
-    return found.random or found.plant.random
-
-
-def if_random(name: str, scenario: Callable[[Any], str | Scenario] = lambda given: given.scenario) -> Rule:
+def if_random(name: str, scenario: Callable[[Any], str] = lambda given: given.scenario) -> Rule:
     """The rule for an option that chooses among the episodes of a scenario."""
-    return Rule((name,), lambda given: varies(scenario(given)), "on a scenario that is the same at every reset")
+    unchanging = "on a scenario that is the same at every reset"
+    return Rule((name,), lambda given: scenarios.find(scenario(given)).varies, unchanging)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -250,23 +250,21 @@ _Episodes = tuple[Scenario, tuple[Seeds, ...], str | None, int]
 
 def _episodes(options: Options) -> list[_Episodes]:
     """The episodes of all scenarios or test sets; with the same seeds those at delay margins, and on ideal plants."""
-    scenarios = _scenarios(options)
     if options.test_sets:
         changed = (options.episodes, options.split, options.steps, options.noise_seeds) != (1, "test", None, 1)
-        if scenarios or changed or options.severities:
+        if options.scenarios or changed or options.severities:
             raise InvalidInputError(
                 f"A test set defines the episodes: with {', '.join(map(repr, options.test_sets))}, expected no "
                 "scenarios, episodes, split, steps, noise_seeds or severities."
             )
-        sets = [test_sets.get(name) for name in options.test_sets]
+        sets = map(test_sets.get, options.test_sets)
         out = [_draw(one.scenario, one.seeds, one.noise_seeds, one.digest, one.sequence) for one in sets]
     else:
-        # A scenario that is the same at every reset is played once.
         several = scenario_registry.seeds(options.split, options.episodes)
-        seeds = [several if one.random or one.plant.random else (0,) for one in scenarios]
         out = [
-            _draw(one, some, options.noise_seeds, length=test_sets.sequence(one.name))
-            for one, some in zip(scenarios, seeds, strict=True)
+            # A scenario that is the same at every reset is played once.
+            _draw(one, several if one.varies else (0,), options.noise_seeds, length=test_sets.sequence(one.name))
+            for one in _scenarios(options)
         ]
     if not options.severities:
         out += [(at_margin(one[0]), *one[1:]) for one in out if one[0].plant.delay_margin]

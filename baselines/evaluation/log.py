@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from baselines.episodes import Episode
 from ikgym.obstacles.solids import closest, link_frames, on_links, solids_of
-from ikgym.plant.draw import DrawnPlant
 from ikgym.validation import FloatArray
 
 #: Most pictures of a replay.
@@ -32,7 +31,10 @@ def trajectory_log(episode: Episode) -> TrajectoryLog:
         For replays, at f <= :data:`FRAMES` of these steps, whose rows are ``frame`` (f,): ``joint_points``
         (f, n, 2, 3), the ends of the joints of the arm that moves, and ``tool`` (f, 3), both in [m], and
         ``tool_rotation`` (f, 3, 3).
-        Where the scenario has collisions, ``clearance`` (k,) in [m], and the arrays of :func:`_place_solids`.
+        Where the scenario has collisions, ``clearance`` (k,) in [m], and at the same moments the solids in the frames
+        that carry them, see :mod:`ikgym.obstacles.solids`: ``solids`` (s, 16), the bodies, then the obstacles;
+        ``carriers`` (s,), the frame of each of them; ``carrier_frames`` (f, c, 12), those of the base and the n links,
+        that of all obstacles at rest, and those of the others; and the ``closest`` points (f, 2, 3) in [m].
     """
     scenario = episode.scenario
     after = np.flatnonzero(scenario.counted())
@@ -57,10 +59,8 @@ def trajectory_log(episode: Episode) -> TrajectoryLog:
         log["qddot"] = (np.diff(episode.qdot, axis=0, prepend=start) / scenario.dt)[kept]
         log["acceleration_limit"] = scenario.arm.acceleration_limit
     frames = frame_rows(len(kept), FRAMES)
-    log |= {"frame": frames, **_arm_in_space(episode, log["q"][frames], after[frames])}
-    if episode.clearance is None:
-        return log
-    return log | {"clearance": episode.clearance[kept]} | _place_solids(episode, log["q"][frames], after[frames])
+    log |= {"frame": frames, **_place_arm(episode, log["q"][frames], after[frames])}
+    return log if episode.clearance is None else log | {"clearance": episode.clearance[kept]}
 
 
 def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
@@ -70,50 +70,32 @@ def frame_rows(rows: int, most: int) -> npt.NDArray[np.int64]:
     return frames
 
 
-def _arm_in_space(episode: Episode, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
-    """Points of the arm that moves, which may differ from its data sheet, after numbers of steps."""
-    plant, n = _plant(episode), episode.scenario.joints
-    loaded = after >= plant.payload_step
-    points, tool, rotation = np.empty((len(q), n, 2, 3)), np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    for rows, arm in ((~loaded, plant.arm), (loaded, plant.loaded_arm)):
-        points[rows] = arm.joint_points(q[rows])
-        rotation[rows], tool[rows] = arm.forward(q[rows])
-    arrays = {"joint_points": points, "tool": tool, "tool_rotation": rotation}
-    return {name: array.astype(np.float32) for name, array in arrays.items()}
-
-
-def _plant(episode: Episode) -> DrawnPlant:
-    return episode.scenario.drawn_plant(episode.seeds.seed, episode.seeds.arm_seed)
-
-
-def _place_solids(episode: Episode, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
-    """Solids in the frames that carry them, and the closest points; see :mod:`ikgym.obstacles.solids`.
-
-    Args:
-        episode: An episode of a scenario with collisions.
-        q: Joint coordinates at some moments in [rad] or [m]. Shape (f, n).
-        after: The steps made then. Shape (f,).
-
-    Returns:
-        ``solids`` (s, 16): the bodies, then the obstacles; ``carriers`` (s,): the frame of each of them; and over the
-        moments ``carrier_frames`` (f, c, 12): those of the base and the n links, that of all obstacles at rest, and
-        those of the others; and ``closest`` (f, 2, 3) in [m].
-    """
-    scenario, plant = episode.scenario, _plant(episode)
-    bodies, obstacles = scenario.arm.bodies, scenario.obstacles_of(episode.seeds.seed)
+def _place_arm(episode: Episode, q: FloatArray, after: npt.NDArray[np.int64]) -> TrajectoryLog:
+    """The arm that moves, which may differ from its data sheet, and what it could touch, after numbers of steps."""
+    scenario, collides = episode.scenario, episode.clearance is not None
+    plant = scenario.drawn_plant(episode.seeds.seed, episode.seeds.arm_seed)
+    n, obstacles = scenario.joints, scenario.obstacles_of(episode.seeds.seed) if collides else ()
     boxes = solids_of(obstacles, scenario.dt * after.astype(np.float64), scenario.model)
     boxes = np.broadcast_to(boxes, (len(q), *boxes.shape[1:]))
-    frames, points = np.empty((len(q), scenario.joints + 1, 12)), np.empty((len(q), 2, 3))
+    points, tool, rotation = np.empty((len(q), n, 2, 3)), np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    frames, nearest = np.empty((len(q), n + 1, 12)), np.empty((len(q), 2, 3))
     for arm, rows in ((plant.arm, after < plant.payload_step), (plant.loaded_arm, after >= plant.payload_step)):
-        frames[rows] = link_frames(arm, q[rows])
-        points[rows] = closest(arm, q[rows], boxes[rows], scenario.surroundings.checked).points
-    moving = [number for number, one in enumerate(obstacles) if one.motion is not None]
-    solids, carriers = boxes[0].copy(), np.full(len(boxes[0]), scenario.joints + 1)
-    solids[moving, :12], carriers[moving] = AT_REST, scenario.joints + 2 + np.arange(len(moving))
+        points[rows] = arm.joint_points(q[rows])
+        rotation[rows], tool[rows] = arm.forward(q[rows])
+        if collides:
+            frames[rows] = link_frames(arm, q[rows])
+            nearest[rows] = closest(arm, q[rows], boxes[rows], scenario.surroundings.checked).points
+    arrays: TrajectoryLog = {"joint_points": points, "tool": tool, "tool_rotation": rotation}
+    arrays = {name: array.astype(np.float32) for name, array in arrays.items()}
+    if not collides:
+        return arrays
+    bodies, moving = scenario.arm.bodies, [k for k, one in enumerate(obstacles) if one.motion is not None]
+    solids, carriers = boxes[0].copy(), np.full(len(boxes[0]), n + 1)
+    solids[moving, :12], carriers[moving] = AT_REST, n + 2 + np.arange(len(moving))
     still = np.tile(AT_REST, (len(q), 1, 1))
-    return {
+    return arrays | {
         "solids": np.vstack([on_links(bodies), solids]),
         "carriers": np.concatenate([np.array(bodies.links, dtype=np.int64), carriers]),
         "carrier_frames": np.concatenate([frames, still, boxes[:, moving, :12]], axis=1).astype(np.float32),
-        "closest": points.astype(np.float32),
+        "closest": nearest.astype(np.float32),
     }

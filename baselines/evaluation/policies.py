@@ -129,7 +129,7 @@ class Specification:
         """The seeds that a reference takes as parameters."""
         if self.solver is None or not self.solver.reference:
             return {}
-        drawn = {"seed": scenario.random or scenario.plant.random, "arm_seed": seeds.arm_seed is not None}
+        drawn = {"seed": scenario.varies, "arm_seed": seeds.arm_seed is not None}
         names = self.solver.parameter_names()
         return {name: getattr(seeds, name) for name, needed in drawn.items() if needed and name in names}
 

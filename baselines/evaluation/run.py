@@ -220,11 +220,10 @@ def _announce(bar: tqdm[Any], batch: Batch) -> None:
 @contextlib.contextmanager
 def _progress(jobs: Sequence[Job], *, shown: bool) -> Iterator[tqdm[Any]]:
     """A progress bar on stderr that counts steps; messages, such as those on compilation, are printed above it."""
-    # A log file has no cursor to go back with.
-    look = {"file": sys.stderr, "dynamic_ncols": True, "mininterval": 0.1 if sys.stderr.isatty() else 10.0}
     total, hidden = sum(job.scenario.steps for job in jobs), not shown or not jobs
-    above = contextlib.nullcontext() if hidden else logging_redirect_tqdm([logger])
-    with tqdm(total=total, disable=hidden, unit="step", unit_scale=True, **look) as bar, above:
+    pause = 0.1 if sys.stderr.isatty() else 10.0  # a log file has no cursor to go back with
+    bar = tqdm(total=total, disable=hidden, unit="step", unit_scale=True, dynamic_ncols=True, mininterval=pause)
+    with bar, contextlib.nullcontext() if hidden else logging_redirect_tqdm([logger]):
         yield bar
 
 

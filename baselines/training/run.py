@@ -221,7 +221,7 @@ def validate(policy: Policy, scenario: Scenario, episodes: int) -> dict[str, flo
         `worst`, the largest ratio, or cost where there are none; `lost`, the share of episodes in which the arm lost
         track; `position_error_max_mm` and `orientation_error_max_mrad`, means of the largest errors of the episodes.
     """
-    seeds = scenarios.seeds("validation", episodes if scenario.random or scenario.plant.random else 1)
+    seeds = scenarios.seeds("validation", episodes if scenario.varies else 1)
     played = rollouts(scenario, policy, seeds)
     costs, known = np.array([add_up(episode.cost) for episode in played]), best_known.costs(scenario, seeds)
     score = {"cost": geometric_mean(costs)}

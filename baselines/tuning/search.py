@@ -110,7 +110,7 @@ def searches(
         UnknownNameError: There is no such policy or parameter.
         InvalidInputError: A solver has no ranges, or refuses the scenario or the end of a range.
     """
-    if not (scenario.random or scenario.plant.random):
+    if not scenario.varies:
         raise InvalidInputError(
             f"{scenario.name} is the same at every reset: expected a scenario whose episodes differ."
         )

@@ -435,6 +435,11 @@ class Scenario(Frozen):
         """Whether the reset seed chooses the trajectory."""
         return self.trajectory.random
 
+    @property
+    def varies(self) -> bool:
+        """Whether episodes differ from reset to reset: in their trajectory, their arm, or their noise."""
+        return self.random or self.plant.random
+
     def nominal(self, seed: int | None = None, preview: Preview = 0) -> FloatArray:
         """The nominal task coordinates X^N(0), X^N(1), … of an episode, one row a step.
 

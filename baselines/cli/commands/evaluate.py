@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from baselines import registry
 from baselines.cli import shell
-from baselines.cli.parsing import Rule, varies
+from baselines.cli.parsing import Rule
 from baselines.evaluation import test_sets
 from baselines.evaluation.jobs import Options
 from baselines.evaluation.metrics import Row
@@ -42,9 +42,13 @@ RULES = (
         lambda given: given.out is not None,
         "without --out",
     ),
-    Rule(("--episodes", "--split"), _any(varies), "on scenarios that are the same at every reset"),
-    Rule(("--noise-seeds",), _any(lambda scenario: scenario.plant.noisy), "on plants without noise"),
-    Rule(("--pairs",), _any(lambda scenario: not scenario.plant.ideal), "on ideal plants"),
+    Rule(
+        ("--episodes", "--split"),
+        _any(lambda one: one.varies),
+        "on scenarios that are the same at every reset",
+    ),
+    Rule(("--noise-seeds",), _any(lambda one: one.plant.noisy), "on plants without noise"),
+    Rule(("--pairs",), _any(lambda one: not one.plant.ideal), "on ideal plants"),
     Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),

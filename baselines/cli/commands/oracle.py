@@ -127,23 +127,11 @@ def optima(
     """Searches episodes, with a bar on stderr, and yields each as soon as it is done."""
     wanted = [SearchJob(scenario, draw, how, tuple(policies), cache) for scenario, draw in todo]
     check_policies(wanted)
-    with tqdm(
-        total=len(todo),
-        file=sys.stderr,
-        unit="episode",
-        dynamic_ncols=True,
-        bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}<{remaining}",
-        mininterval=0.1 if sys.stderr.isatty() else 10.0,
-    ) as bar:
-        done = 0
-
-        def tick(one: SearchJob, share: float) -> None:
-            bar.set_description(f"{one.scenario.name}, seed {one.draw.seed} ({done + 1}/{len(todo)})", refresh=False)
-            bar.update(share)
-
-        for one, optimum in find_all(wanted, workers, tick):
-            done += 1
-            bar.update(done - bar.n)
+    look, pause = "{percentage:3.0f}% |{bar}| {elapsed}<{remaining}", 0.1 if sys.stderr.isatty() else 10.0
+    with tqdm(total=len(todo), dynamic_ncols=True, bar_format=look, mininterval=pause) as bar:
+        found = find_all(wanted, workers, lambda _, share: bar.update(share))
+        for number, (one, optimum) in enumerate(found, 1):
+            bar.update(number - bar.n)
             bar.clear()
             yield one.scenario, optimum
 

@@ -64,7 +64,7 @@ class Told(NamedWrapper):
         for name in ("seed", "arm_seed"):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, whole_number(name, value, at_least=0))
-        if self.seed is None and (scenario.random or scenario.plant.random):
+        if self.seed is None and scenario.varies:
             raise InvalidInputError(f"Scenario {scenario.name!r} is random: a seed says which episode is meant.")
         object.__setattr__(self, "drawn", scenario.drawn_plant(self.seed or 0, self.arm_seed))
         super().__post_init__()

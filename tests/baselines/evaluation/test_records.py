@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-import scipy.stats
 
 from baselines.evaluate import evaluate
 from baselines.evaluation.metrics import Row
@@ -13,7 +12,7 @@ from baselines.evaluation.plots import comparison
 from baselines.evaluation.plots.style import png
 from baselines.evaluation.summary import BEST_KNOWN, LOWEST, rank
 from baselines.evaluation.table import from_csv, markdown, to_csv
-from baselines.statistics import geometric_interval, geometric_mean
+from baselines.statistics import geometric_interval
 from ikgym.exceptions import InvalidInputError
 
 
@@ -103,29 +102,6 @@ def test_rows_are_a_frame():
     assert frame.total_cost.tolist() == [row.total_cost for row in rows]
     assert frame.orientation_error_max.isna().all()
     assert frame.lost.tolist() == [row.lost for row in rows]
-
-
-class TestInterval:
-    def test_one_seed_is_the_bootstrap_of_scipy(self):
-        values = np.random.default_rng(1).lognormal(size=60)
-        found = scipy.stats.bootstrap((np.log(values),), np.mean, method="percentile", random_state=0)
-        expected = np.exp([found.confidence_interval.low, found.confidence_interval.high])
-        assert geometric_interval(values) == pytest.approx(tuple(expected), rel=0.02)
-
-    def test_copies_of_a_seed_say_nothing_new(self):
-        assert (geometric_mean([0.0, 5.0]), geometric_mean([2.0, 8.0])) == (0.0, pytest.approx(4.0))
-        one = np.random.default_rng(6).lognormal(size=(1, 64))
-        assert geometric_interval(np.tile(one, (5, 1))) == pytest.approx(geometric_interval(one), rel=1e-12)
-
-    @pytest.mark.slow
-    def test_coverage(self):
-        rng, hits, trials = np.random.default_rng(9), 0, 150
-        seeds, of_seed, of_episode = 10, 0.3, 1.0
-        for _ in range(trials):
-            logs = of_seed * rng.normal(size=(seeds, 1)) + of_episode * rng.normal(size=(1, 64))
-            low, high = geometric_interval(np.exp(logs))
-            hits += low <= 1.0 <= high
-        assert 0.88 <= hits / trials <= 0.985
 
 
 def line(policy, ratio, p99, **changes):
