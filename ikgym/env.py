@@ -15,11 +15,11 @@ from ikgym import scenarios
 from ikgym.exceptions import InvalidInputError, ResetNeededError
 from ikgym.kernels.outcome import OBSERVED as OBSERVED
 from ikgym.kernels.outcome import Observation, observation
-from ikgym.options import checked_distance, checked_options
+from ikgym.options import checked_options
 from ikgym.scenarios import Preview, Scenario
 from ikgym.simulator import Simulator
 from ikgym.spaces import action_space, observation_space
-from ikgym.validation import FloatArray
+from ikgym.validation import FloatArray, number
 
 #: The keys of `info` after a step; the orientation error is there where the task has an orientation.
 REPORTED = ("tracking_cost", "velocity_cost", "position_error", "orientation_error", "clipped", "at_limit", "time")
@@ -45,7 +45,7 @@ class Arms:
         self._most_steps = self.scenario.steps
         # First, since it checks the memory.
         self._simulator = Simulator(self.scenario, rows, preview, commands=commands)
-        self.lost_distance = checked_distance(lost_distance)
+        self.lost_distance = None if lost_distance is None else number("lost_distance", lost_distance, above=0.0)
         self._renderers: list[Renderer] = []
         if render_mode is not None:
             from ikgym.rendering import Renderer  # matplotlib is slow to import

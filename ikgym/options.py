@@ -18,7 +18,6 @@ from ikgym.validation import (
     FloatArray,
     float_array,
     known_names,
-    number,
     one_a_row,
     shorten,
     whole_number,
@@ -56,11 +55,6 @@ def checked_mode(mode: str | AutoresetMode) -> AutoresetMode:
         return AutoresetMode(mode)
     except ValueError:
         raise UnknownNameError("autoreset mode", mode, [m.value for m in AutoresetMode]) from None
-
-
-def checked_distance(distance: float | None) -> float | None:
-    """The distance at which a track is lost, or None."""
-    return None if distance is None else number("lost_distance", distance, above=0.0)
 
 
 def checked_options(options: dict[str, Any] | None, known: Sequence[str]) -> dict[str, Any]:
@@ -124,6 +118,16 @@ def checked_steps(given: Any, rows: int, scenario: Scenario) -> Steps | None:
             f"the arm is after {max(checked)} steps; that of {scenario.name!r} is a path of the tool."
         )
     return np.array(checked, dtype=np.int64)
+
+
+def checked_arm_seeds(given: Any, rows: int, scenario: Scenario) -> list[int | None] | None:
+    """Seeds of arms that are kept, one for all rows or one a row, in which None draws an arm with the episode."""
+    if given is None:
+        return None
+    checked = one_a_row("options['arm_seed']", given, rows)
+    if any(seed is not None for seed in checked):
+        scenario.plant.check_draws_arm(scenario.name)
+    return checked
 
 
 def entered_states(

@@ -16,8 +16,8 @@ from ikgym.kernels.outcome import OBSERVED, Outcome, more_size, observation, out
 from ikgym.kernels.outcome import Observation as Observation
 from ikgym.kernels.simulation import Constants, State
 from ikgym.kernels.threads import in_chunks
-from ikgym.options import checked_starts, checked_steps, entered_states, take_actions
-from ikgym.plant.rows import PlantRows, checked_arm_seeds
+from ikgym.options import checked_arm_seeds, checked_starts, checked_steps, entered_states, take_actions
+from ikgym.plant.rows import PlantRows
 from ikgym.plant.step import step
 from ikgym.scenarios import Scenario
 from ikgym.scenarios.contacts import check_clear, draw_obstacles, plant_rows
@@ -161,7 +161,7 @@ class Simulator:
         rows, scenario = self.rows, self.scenario
         return {
             "starts": checked_starts(options.get("q"), rows, scenario),
-            "arm_seeds": checked_arm_seeds(options.get("arm_seed"), rows, scenario.plant, scenario.name),
+            "arm_seeds": checked_arm_seeds(options.get("arm_seed"), rows, scenario),
             "steps": checked_steps(options.get("step"), rows, scenario),
         }
 

@@ -281,6 +281,21 @@ def about(what: object) -> Iterator[None]:
         raise InvalidInputError(f"{what}: {error}") from None
 
 
+@contextlib.contextmanager
+def add_location(where: str, file: object = None) -> Iterator[None]:
+    """Adds the file or the table to the messages of errors."""
+    if not where and file is None:
+        yield
+        return
+    before, after = (f"[{where}] ", f" of [{where}]") if file is None else (f"{file}: ", f" in {file}")
+    try:
+        yield
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{error.kind}{after}", error.name, error.available) from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{before}{error}") from None
+
+
 def different_texts(name: str, value: Any, count: int | None = None) -> tuple[str, ...]:
     """A list of different texts, none of them empty, by default of any length."""
     texts = tuple(value) if isinstance(value, (tuple, list)) else ()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from ikgym.arms import Arm
-from ikgym.exceptions import InvalidInputError, UnknownNameError
+from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.frozen import Frozen
 from ikgym.plant.checks import PerJoint, joint_numbers
 from ikgym.plant.plant import Plant
-from ikgym.validation import Positive, known_names, shorten
+from ikgym.validation import Positive, add_location, different_texts, known_names, shorten
 
 #: Control periods may differ by this share: that of a log is measured.
 ALIKE = 0.01
@@ -35,18 +35,11 @@ class IdentifiedPlant(Frozen):
     """
 
     arm: str
-    joints: tuple[str, ...]
+    joints: Annotated[tuple[str, ...], different_texts]
     period: Positive
     plant: Plant
-    delay: PerJoint = 0.0
-    time_constant: PerJoint = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.joints, (tuple, list)) or not all(isinstance(one, str) for one in self.joints):
-            raise InvalidInputError(f"joints: expected names of joints, got {shorten(self.joints)}.")
-        self._settle(joints=tuple(self.joints), delay=joint_numbers("delay", self.delay))
-        self._settle(time_constant=joint_numbers("time_constant", self.time_constant))
+    delay: Annotated[PerJoint, joint_numbers] = 0.0
+    time_constant: Annotated[PerJoint, joint_numbers] = 0.0
 
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Self:
@@ -57,7 +50,7 @@ class IdentifiedPlant(Frozen):
             UnknownNameError: There is no such key.
         """
         table = read_user_toml(file)
-        try:
+        with add_location("", file):
             known_names("key", table, ("arm", "joints", "period", "plant", "drives"))
             missing = [key for key in ("arm", "joints", "period", "plant") if key not in table]
             if missing:
@@ -66,10 +59,6 @@ class IdentifiedPlant(Frozen):
             known_names("key of [plant]", plant, [field.name for field in dataclasses.fields(Plant)])
             known_names("key of [drives]", drives, ("delay", "time_constant"))
             return cls(table["arm"], table["joints"], table["period"], Plant(**plant), **drives)
-        except UnknownNameError as error:
-            raise UnknownNameError(f"{error.kind} in {file}", error.name, error.available) from None
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{file}: {error}") from None
 
     def plant_for(self, arm: Arm, period: float) -> Plant:
         """The plant, for a scenario's arm and its Δt in [s].

@@ -20,36 +20,13 @@ from ikgym.plant.plant import Plant
 from ikgym.plant.response import PAST, Response
 from ikgym.plant.sensor_kernels import STREAMS
 from ikgym.plant.step import Drives, PlantState, Sensors
-from ikgym.validation import FloatArray, one_a_row
+from ikgym.validation import FloatArray
 
 # Numbers of the streams that other noises of an episode come from: more than there are effects.
 NOISE_SEEDS = 1000
 # Rows whose draws are worth a thread.
 GRAIN = 64
 Integers = npt.NDArray[np.int64]
-
-
-def checked_arm_seeds(given: Any, rows: int, plant: Plant, name: str) -> list[int | None] | None:
-    """Seeds of arms, chosen by the user.
-
-    Args:
-        given: A whole number for all rows, or one a row, where None is an arm that is drawn with the episode.
-        rows: N.
-        plant: The plant of the scenario.
-        name: Name of the scenario.
-
-    Returns:
-        One a row, or None if none is given.
-
-    Raises:
-        InvalidInputError: They are no such numbers, not one a row, or the plant draws no arm that could be kept.
-    """
-    if given is None:
-        return None
-    checked = one_a_row("options['arm_seed']", given, rows)
-    if any(one is not None for one in checked):
-        plant.check_draws_arm(name)
-    return checked
 
 
 class PlantRows:

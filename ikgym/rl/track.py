@@ -76,14 +76,14 @@ class Learner:
             begun: Rows whose episodes have begun. Shape (N,).
         """
         self._context = context[:, : self._contexts].copy()
-        return self._shown(self._features(seen, self._context), begun)
+        return self._show(self._features(seen, self._context), begun)
 
     def observe(self, seen: dict[str, FloatArray], context: FloatArray, begun: BoolArray) -> Features:
         """The observations after a step; for the arguments see :meth:`reset`."""
         self._context = context[:, : self._contexts].copy()
         features = self._features(seen, self._context)
         self._history = np.concatenate([features[:, None], self._history[:, :-1]], axis=1)
-        return self._shown(features, begun)
+        return self._show(features, begun)
 
     def last_observations(self, rows: npt.NDArray[np.int64], seen: Sequence[dict[str, FloatArray]]) -> list[Features]:
         """The last observations of k rows whose next episodes have begun in the same step.
@@ -122,7 +122,7 @@ class Learner:
             self._closeness = closeness
         return rewards
 
-    def _shown(self, features: Features, begun: BoolArray) -> Features:
+    def _show(self, features: Features, begun: BoolArray) -> Features:
         if self._task.progress:
             twist = features[begun, self._first].astype(np.float64) * (self._task.coarse / UNIT)
             self._closeness[begun] = cost_rewards(self._task, (twist * twist).sum(axis=1))

@@ -30,7 +30,7 @@ from ikgym.scenarios.reachability import Gap, gaps
 from ikgym.scenarios.scenario import Scenario, duration
 from ikgym.trajectories import PublishedPath
 from ikgym.trajectories.orientations import matrices
-from ikgym.validation import known_name, shorten, whole_number
+from ikgym.validation import add_location, known_name, shorten, whole_number
 
 __all__ = [
     "SPLITS",
@@ -82,7 +82,7 @@ def load(file: str | os.PathLike[str]) -> Scenario:
     table, plant = read_user_toml(file), None
     if isinstance(table.get("plant"), str):  # identified, see :mod:`ikgym.plant.identified`
         plant = IdentifiedPlant.load(pathlib.Path(file).parent / table.pop("plant"))
-    with files.add_location("", file):
+    with add_location("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
         if base is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import inspect
 import json
@@ -10,7 +9,7 @@ import logging
 import os
 import pathlib
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from ikgym.arms import Arm
 from ikgym.arms.arm import FACTS, numbered_joints
 from ikgym.arms.bodies import Bodies
 from ikgym.cost import ProximityCost, TrackingCost
-from ikgym.exceptions import IkgymError, InvalidInputError, UnknownNameError
+from ikgym.exceptions import IkgymError, InvalidInputError
 from ikgym.obstacles import KINDS as OBSTACLES
 from ikgym.obstacles import MOST_OBSTACLES, Obstacle
 from ikgym.plant import Plant
@@ -29,7 +28,7 @@ from ikgym.trajectories import KINDS, TimeLaw, Trajectory, from_csv
 from ikgym.trajectories.orientations import ORIENTATIONS, Orientation
 from ikgym.trajectories.paths import PATHS, Path
 from ikgym.trajectories.time_laws import TIME_LAWS
-from ikgym.validation import known_names
+from ikgym.validation import add_location, known_names
 
 logger = logging.getLogger("ikgym")
 
@@ -156,21 +155,6 @@ def _meaning(hint: Any) -> str:
     if kind is Task or hint is str or (typing.get_origin(hint) is not Sequence and {str} <= classes <= TEXTS):
         return "a text"
     return "numbers" if kind is None else "a table"
-
-
-@contextlib.contextmanager
-def add_location(where: str, file: object = None) -> Iterator[None]:
-    """Adds the file or the table to the messages of errors."""
-    if not where and file is None:
-        yield
-        return
-    before, after = (f"[{where}] ", f" of [{where}]") if file is None else (f"{file}: ", f" in {file}")
-    try:
-        yield
-    except UnknownNameError as error:
-        raise UnknownNameError(f"{error.kind}{after}", error.name, error.available) from None
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{before}{error}") from None
 
 
 def save(fields: Mapping[str, Any], file: str | os.PathLike[str]) -> None:

@@ -49,7 +49,7 @@ class PathTrajectory(Trajectory):
     def frames(self, times: FloatArray, model: Arm) -> FloatArray:
         """See :meth:`Trajectory.frames`."""
         del model
-        s = self.time_law.travelled(times, self.path)
+        s = self.time_law.travel(times, self.path)
         points = self.path.along(s)[0]
         if self.orientation is None:
             return points

@@ -50,7 +50,7 @@ class TimeLaw(Frozen, abc.ABC):
             )
         return self.duration
 
-    def travelled(self, times: FloatArray, path: Path) -> FloatArray:
+    def travel(self, times: FloatArray, path: Path) -> FloatArray:
         """The arc length covered, in [m]: 0 until the time 0, and that of the whole path from the end on.
 
         Args:
@@ -58,14 +58,14 @@ class TimeLaw(Frozen, abc.ABC):
             path: The path.
         """
         time = self.time(path)
-        return self.covered(np.clip(times, 0.0, time), time, path.length, self._limits_along(path)[1])
+        return self.cover(np.clip(times, 0.0, time), time, path.length, self._limits_along(path)[1])
 
     @abc.abstractmethod
     def shortest(self, length: float, speed: float, acceleration: float) -> float:
         """The shortest time for a length in [m], in [s]."""
 
     @abc.abstractmethod
-    def covered(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
+    def cover(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
         """The arc length covered after t in [s], if the whole length in [m] takes ``time``."""
 
     def _limits_along(self, path: Path) -> tuple[float, float]:
@@ -84,8 +84,8 @@ class Quintic(TimeLaw):
         """Its largest speed is 15/8 L/T, its largest acceleration 10/√3 L/T²."""
         return max(1.875 * length / speed, math.sqrt(10.0 / math.sqrt(3.0) * length / acceleration))
 
-    def covered(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
-        """See :meth:`TimeLaw.covered`."""
+    def cover(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
+        """See :meth:`TimeLaw.cover`."""
         u = t / time
         return np.minimum(length * u**3 * (10.0 + u * (6.0 * u - 15.0)), length)
 
@@ -103,8 +103,8 @@ class Trapezoidal(TimeLaw):
             return 2.0 * math.sqrt(length / acceleration)
         return length / speed + speed / acceleration
 
-    def covered(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
-        """See :meth:`TimeLaw.covered`."""
+    def cover(self, t: FloatArray, time: float, length: float, acceleration: float) -> FloatArray:
+        """See :meth:`TimeLaw.cover`."""
         # The speed v that takes this time: T = L / v + v / a.
         half = 0.5 * acceleration * time
         speed = length * acceleration / (half + math.sqrt(max(half**2 - acceleration * length, 0.0)))

@@ -26,7 +26,7 @@ from ikgym.arms import Arm
 from ikgym.exceptions import InvalidInputError
 from ikgym.files import read_user_toml
 from ikgym.scenarios import Scenario, files
-from ikgym.validation import BoolArray, FloatArray, known_names, whole_number
+from ikgym.validation import BoolArray, FloatArray, add_location, known_names, whole_number
 
 #: Most branches in the table, and the number of the column of clearances.
 SHOWN, CLEARANCE = 8, 5
@@ -110,7 +110,7 @@ def _scenario(options: Options) -> Scenario:
 def _obstacles(file: pathlib.Path) -> dict[str, Any]:
     """The obstacles of a file, as a field of a scenario."""
     table = read_user_toml(file)
-    with files.add_location("", file):
+    with add_location("", file):
         known_names("key", table, [field.name for field in dataclasses.fields(Scenario)])
         if "obstacles" not in table:
             raise InvalidInputError("obstacles: expected tables [[obstacles]], got no such key.")
