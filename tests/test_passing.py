@@ -1,4 +1,7 @@
-"""Random motion among bodies: at no tenth of a step is one inside of another, with coal as the judge."""
+"""Random motion among bodies: at no tenth of a step is one inside of another.
+
+Distances of pairs are compared with coal in tests/kernels/test_segments.py, the smallest of them in test_bodies.py.
+"""
 
 import gymnasium as gym
 import numpy as np
@@ -6,13 +9,13 @@ import pytest
 
 import ikgym
 from ikgym.kernels.bodies import clearance_rows
+from ikgym.obstacles.solids import closest
 from tests.bodied import AROUND, PERSON, crowd
-from tests.judge import Judge
 
 CROWD = crowd(1000, (*AROUND, PERSON))
 NAMES = [*ikgym.scenarios.names("bodies"), CROWD.name]
-#: Steps of all scenarios together; arms side by side; of each step the judge sees so many that are closest, if they are
-#: nearer than a distance in [m].
+#: Steps of all scenarios together; arms side by side; of each step so many are measured that are closest, if they
+#: are nearer than a distance in [m].
 MANY, ROWS, CLOSEST, NEAR = 1_000_000, 50, 4, 0.01
 
 
@@ -36,12 +39,12 @@ def scenario_of(name):
 def check(scenario, count):
     """Moves arms for a number of steps; returns their lowest distance and how often one was stopped."""
     lowest, moved, stops, walk = np.inf, 0, 0, Walk(scenario)
-    judge = Judge(scenario)
+    arm, checked = scenario.arm, scenario.surroundings.checked
     while moved < count:
         ways, places, clearances = walk.some_steps()
         moved, stops = moved + walk.moved, stops + walk.stopped.sum()
-        distances = judge(tenths(*ways), tenths(*places))
-        np.testing.assert_allclose(distances[-len(clearances) :], clearances, atol=2e-6)
+        distances = closest(arm, tenths(*ways), tenths(*places), checked).distances
+        np.testing.assert_allclose(distances[-len(clearances) :], clearances, atol=1e-12)
         lowest = min(lowest, distances.min(initial=np.inf))
         walk.begin_again()
     assert lowest > 0.0

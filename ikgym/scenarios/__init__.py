@@ -85,19 +85,12 @@ def load(file: str | os.PathLike[str]) -> Scenario:
     with add_location("", file):
         base = get(table.pop("like")) if "like" in table else None
         fields = files.arguments(Scenario, table, pathlib.Path(file).parent, like=base is not None)
-        if base is None:
-            return _with_plant(Scenario(**fields), plant)
-        if "trajectory" in fields and duration(fields["trajectory"]) is not None:
+        if base is not None and "trajectory" in fields and duration(fields["trajectory"]) is not None:
             fields.setdefault("steps", None)  # those of the new path
-        if plant is not None:
+        if base is not None and plant is not None:
             fields["plant"] = Plant()  # in place of one that belongs to another Δt or arm
-        return _with_plant(base.replace(**fields), plant)
-
-
-def _with_plant(scenario: Scenario, identified: IdentifiedPlant | None) -> Scenario:
-    if identified is None:
-        return scenario
-    return scenario.replace(plant=identified.plant_for(scenario.arm, scenario.dt))
+        scenario = Scenario(**fields) if base is None else base.replace(**fields)
+        return scenario if plant is None else scenario.replace(plant=plant.plant_for(scenario.arm, scenario.dt))
 
 
 _registry: Registry[Scenario] = Registry("scenario", Scenario)
