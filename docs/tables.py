@@ -16,6 +16,7 @@ from baselines.evaluation import test_sets as sets
 from baselines.evaluation.table import grid, markdown
 from baselines.registry import get
 from baselines.status import Status
+from docs.drives import predictions
 from docs.keeping import PAGES, lines
 from docs.paper_pages import claims
 
@@ -63,7 +64,7 @@ def statuses() -> list[tuple[str, ...]]:
     return rows
 
 
-TABLES = {make.__name__: make for make in (tasks, splits, policies, statuses, test_sets)}
+TABLES = {make.__name__: make for make in (tasks, splits, policies, statuses, test_sets, predictions)}
 
 
 def csv_table(name: str, *words: str) -> str:
