@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 
 import ikgym
@@ -132,19 +131,6 @@ def test_an_episode_begins_at_its_first_step_also_after_a_lost_one(name):
         while not lost:
             lost = env.step(most)[2]
         env.reset()
-
-
-@every_id
-def test_wrappers_of_gymnasium(name):
-    env = NormalizeObservation(RecordEpisodeStatistics(TimeLimit(gym.make(name, lost_distance=None), 4)))
-    env.reset(seed=0)
-    steps = [env.step(action) for action in actions_of(env, 4)]
-    seen, _, terminated, truncated, info = steps[-1]
-    assert truncated
-    assert not terminated
-    assert info["episode"]["r"] == pytest.approx(sum(step[1] for step in steps))
-    assert seen.shape == env.unwrapped.observation_space.shape
-    assert np.abs(seen).max() < 10.0
 
 
 @every_id
