@@ -2,7 +2,7 @@
 
 Trains each algorithm in each environment with each seed, a process a core, and plays the last model on episodes of the
 split `test`. ``docs/results/learning_runs.csv`` keeps the curves; a run that stands there with the same settings is not
-repeated, so the command may be killed and continued. Runs with the settings `former` had another reward.
+repeated, so the command may be killed and continued.
 ``docs/results/learning.csv`` has a line for each algorithm and environment, ``docs/images/learning.png`` the curves.
 """
 
@@ -195,7 +195,7 @@ def _groups(lines: Sequence[Line]) -> dict[tuple[str, ...], list[Line]]:
 
 
 def _same(line: Line, run: Line) -> bool:
-    """Whether a line is of this run, also with former settings."""
+    """Whether a line is of this run, also with other settings."""
     return all(line[name] == run[name] for name in RUN if name != "digest")
 
 
