@@ -165,6 +165,17 @@ def test_held_points_count_once():
         assert info["position_error"] > 0
 
 
+def test_khan_moves_and_measures_the_exact_arm_and_maps_nominals_through_the_model():
+    scenario = ikgym.scenarios.get("khan8-q1")
+    env = make(scenario)
+    observation, _ = env.reset()
+    exact, approximate = ikgym.arms.get("khan8"), ikgym.arms.get("khan8_approximate")
+    q = observation["q"]
+    np.testing.assert_array_equal(observation["pose"], scenario.task.coordinates(*exact.forward(q)))
+    first = scenario.task.coordinates(*approximate.forward([0.5 * np.sin(1e-3), 0, 0, 0, 0, 0, 0, 0]))
+    np.testing.assert_allclose(observation["nominal"][0], first, atol=1e-14)
+
+
 def test_zhang_helix_measures_zero_at_the_start_only():
     env = make("zhang3-helix")
     observation, _ = env.reset()

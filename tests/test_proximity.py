@@ -84,3 +84,9 @@ def test_episodes_with_it_are_others_and_no_best_cost_is_sought():
     assert len({fingerprint(one) for one in (scenario, near, near.replace(proximity=NEAR.replace(delta=0.1)))}) == 3
     with pytest.raises(InvalidInputError, match=r"'panda-table': expected no proximity, got ProximityCost"):
         EpisodeProblem.of(near, 0)
+
+
+def test_a_file_switches_it_on(tmp_path):
+    file = tmp_path / "near.toml"
+    file.write_text('name = "near"\nlike = "panda-table"\n\n[proximity]\nclearance = 0.05\np_in = 1\n')
+    assert ikgym.scenarios.load(file).proximity == ikgym.ProximityCost(0.05, p_in=1)

@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import ikgym
 from ikgym.exceptions import InvalidInputError, ResetNeededError
@@ -64,6 +65,24 @@ def test_bit_identical_to_sync_over_whole_episodes(scenario, options, mode):
     assert sum(truncated.sum() for *_, truncated, _ in returned) >= 2 * N
     held = sum(infos.get("at_limit", np.zeros((N, 3))).sum(axis=0) for *_, infos in returned)
     assert (held > 0).all() if scenario.name == limited().name else held.any() <= scenario.arm.limited
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
+def test_record_episode_statistics(mode):
+    steps = 5
+    envs = RecordEpisodeStatistics(make(short("varga7-fast", steps), mode))
+    envs.reset(seed=0)
+    returns = np.zeros(N)
+    for _ in range(steps):
+        _, rewards, _, truncated, infos = envs.step(np.full((N, 7), 0.1, dtype=np.float32))
+        returns += rewards
+    assert truncated.all()
+    info = infos["episode"]
+    np.testing.assert_array_equal(info["l"], steps)
+    np.testing.assert_allclose(info["r"], returns, rtol=1e-12)
+    if mode is AutoresetMode.DISABLED:
+        envs.reset(options={"reset_mask": np.array([True, True, False])})
+        np.testing.assert_array_equal(envs.env.unwrapped._simulator.steps_made, [0, 0, steps])
 
 
 def test_ignored_actions_may_be_anything_but_others_may_not():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -118,6 +119,19 @@ def test_the_environment_runs_from_the_wheel(installed):
 
 
 @pytest.mark.slow
+def test_agents_are_evaluated_from_the_wheel(installed):
+    run, _, folder = installed
+    policies = ("dls", "agent_alone")
+    done = run("ikgym", "evaluate", "--scenarios", "varga7-random", "--policies", *policies, "--out", "out")
+    assert "varga7-random" in done.stdout
+    rows = json.loads((folder / "out" / "results.json").read_text())
+    rows = rows["rows"] if isinstance(rows, dict) else rows
+    assert [row["policy"] for row in rows] == list(policies)
+    assert all(row["cost_ratio"] > 0.9 for row in rows)
+    assert (folder / "out" / "report.html").exists()
+
+
+@pytest.mark.slow
 def test_an_agent_is_trained_from_the_wheel(installed):
     run, _, folder = installed
     tiny = "--env ikgym/Track-v0 --total-timesteps 512 --validations 1 --episodes 2 --out runs"
@@ -126,3 +140,11 @@ def test_an_agent_is_trained_from_the_wheel(installed):
     assert agent.is_file()
     done = run("ikgym", "evaluate", "--scenarios", "learning-track", "--policies", f"agent:{agent}", "--steps", "5")
     assert "agent" in done.stdout
+
+
+@pytest.mark.slow
+def test_lists_come_from_the_wheel(installed):
+    run, _, _ = installed
+    lists = "[main([word]) for word in ('arms', 'scenarios', 'policies')]"
+    text = run("python", "-c", f"from baselines.cli import main; {lists}").stdout
+    assert all(name in text for name in ("fetch_arm", "khan8-q1", "rhc_foresight"))

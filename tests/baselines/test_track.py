@@ -10,8 +10,10 @@ import pytest
 import baselines
 import ikgym
 from baselines.evaluate import evaluate
+from baselines.evaluation.plots import style
 from baselines.files import ResultsError
 from baselines.status import Status
+from ikgym.exceptions import InvalidInputError, UnknownNameError
 
 STEPS = 30
 
@@ -84,6 +86,13 @@ def test_csv_has_units_and_every_digit(tmp_path, scenario):
         track.to_csv(tmp_path / "track.csv" / "below")
 
 
+def test_plot_is_a_figure():
+    figure = baselines.track("varga7-fast", "dls", steps=STEPS).plot()
+    drawn = [line for axes in figure.axes for line in axes.lines]
+    assert len(drawn) == 2 + 3 * 2  # errors, and nominal and actual position
+    assert len(style.png(figure)) > 1000
+
+
 def test_whatever_can_be_evaluated_can_be_tracked():
     class Still:
         preview = 1
@@ -98,3 +107,20 @@ def test_whatever_can_be_evaluated_can_be_tracked():
     assert baselines.track(scenario, baselines.make("dls", scenario), steps=3).policy == "dls"
     wrapped = baselines.track("zhang3-helix", Still(), steps=3, wrap=gym.wrappers.FlattenObservation)
     np.testing.assert_array_equal(wrapped.q, track.q[:3])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "message"),
+    [
+        (("varga7-fest", "dls"), {}, UnknownNameError, "Did you mean 'varga7-fast'"),
+        (("varga7-fast", "dsl"), {}, UnknownNameError, "Did you mean 'dls'"),
+        (("varga7-fast", "dls"), {"steps": 0}, InvalidInputError, "steps: expected a whole number of at least 1"),
+        (("varga7-fast", "dls"), {"seed": -1}, InvalidInputError, "seed: expected a whole number of at least 0"),
+        (("varga7-fast", "rhc_gradient"), {"preview": 1, "steps": 3}, InvalidInputError, "2 steps ahead"),
+        (("zhang3-helix", "follow_nominal"), {}, InvalidInputError, "follow_nominal does not suit zhang3-helix"),
+        (("varga7-fast", ["dls"]), {}, InvalidInputError, "policy: expected a name"),
+    ],
+)
+def test_bad_input_is_refused(arguments, options, error, message):
+    with pytest.raises(error, match=message):
+        baselines.track(*arguments, **options)

@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import ikgym
 from ikgym.exceptions import InvalidInputError
 from tests.comparison import identical
-from tests.limited import LOWER, UPPER, VELOCITY, limited
+from tests.limited import ACCELERATION, LOWER, UPPER, VELOCITY, limited
 
 DT, SCALE = 0.1, 4.0
 # The bandwidth at which a drive makes up for half of what is missing in a step, in [Hz].
@@ -120,6 +121,25 @@ def test_who_keeps_a_limit_exactly_is_not_held_back():
 
 
 ACTIONS = hnp.arrays(np.float32, (25, 7), elements=st.floats(-1.5, 1.5, width=32))
+
+
+@settings(max_examples=40, derandomize=True, deadline=None)
+@given(ACTIONS, st.integers(0, 10_000), st.sampled_from([0.0, 3.0]))
+def test_no_action_leaves_the_limits(actions, seed, noise):
+    """Noise or not; that each step is that of the specification is in tests/test_env.py."""
+    scenario = limited(steps=len(actions), plant=ikgym.Plant(noise=noise))
+    env = ikgym.RedundantIKEnv(scenario)
+    last, _ = env.reset(seed=seed)
+    for action in actions:
+        seen, *_ = env.step(action)
+        q, qdot, dt = seen["q"], seen["qdot"], scenario.dt
+        assert ((q >= LOWER) & (q <= UPPER)).all()
+        assert (np.abs(qdot) <= np.minimum(VELOCITY, scenario.velocity_limit)).all()
+        assert env.observation_space.contains(seen)
+        free = (q > LOWER) & (q < UPPER)
+        change = np.abs(qdot - last["qdot"])
+        assert (change[free] <= dt * ACCELERATION[free] * (1 + 1e-9) + 1e-12).all()
+        last = seen
 
 
 def test_wide_limits_change_no_bit():

@@ -154,13 +154,37 @@ def test_kinematics_are_those_of_the_drawn_arm(ideal):
     np.testing.assert_allclose(played.told_of("tracking_cost"), costs, rtol=1e-9)
 
 
-def test_what_is_observed_and_charged_is_the_command():
-    lagging, straight = (
-        Played(plant, command=lambda k: np.full(7, 0.003)) for plant in (Plant(bandwidth=15.0), Plant())
+def test_a_command_comes_late(ideal):
+    played = Played(Plant(command_delay=5))
+    assert identical(np.array(played.true_q)[:6], np.tile(played.true_q[0], (6, 1)))
+    assert identical(played.of("qdot")[5:], ideal.of("qdot")[:-5])
+    np.testing.assert_allclose(np.array(played.true_q)[5:], np.array(ideal.true_q)[:-5], rtol=0, atol=1e-15)
+
+
+def test_a_drive_lags_behind_its_command():
+    """The answer to a step; what is observed and charged is the command."""
+    played = Played(Plant(bandwidth=15.0), command=lambda k: np.full(7, 0.003))  # within the limits of acceleration
+    asked = 0.003 * played.scenario.velocity_limit
+    velocity = np.diff(played.true_q, axis=0) / played.scenario.dt
+    k = np.arange(1, STEPS + 1)[:, None]
+    time_constant = 1.0 / (2.0 * np.pi * 15.0)
+    np.testing.assert_allclose(velocity, asked * (1.0 - np.exp(-k * played.scenario.dt / time_constant)), rtol=1e-6)
+    straight = Played(Plant(), command=lambda k: np.full(7, 0.003))
+    assert identical(played.of("qdot"), straight.of("qdot"))
+    assert identical(played.told_of("velocity_cost"), straight.told_of("velocity_cost"))
+
+
+def test_backlash_is_lost_where_a_drive_turns():
+    """Half of it at the start, all of it where the direction changes."""
+    there, back = np.full(7, 0.01), np.full(7, -0.01)
+    played, free = (
+        Played(plant, command=lambda k: there if k < 30 else back) for plant in (Plant(backlash=1e-4), Plant())
     )
-    assert not identical(lagging.true_q, straight.true_q)
-    assert identical(lagging.of("qdot"), straight.of("qdot"))
-    assert identical(lagging.told_of("velocity_cost"), straight.told_of("velocity_cost"))
+    way, wanted = (np.array(one.true_q) - one.true_q[0] for one in (played, free))
+    np.testing.assert_allclose(way[30], wanted[30] - 0.5e-4, atol=1e-12)
+    np.testing.assert_allclose(way[-1] - way[30], wanted[-1] - wanted[30] + 1e-4, atol=1e-12)
+    assert identical(played.of("q"), np.array(played.true_q))
+    assert identical(played.of("qdot"), free.of("qdot"))
 
 
 def test_commands_are_shown_newest_first():

@@ -127,6 +127,15 @@ def test_the_context_ends_the_observation_and_is_that_of_the_plant():
     assert rl.make("panda-payload").reset(seed=3)[1] == {}
 
 
+def test_last_observations_have_the_context_of_their_own_episodes():
+    envs = rl.make_vec(CONTEXT, N, context=True, lost_distance=None, autoreset_mode="SameStep")
+    envs.reset(seed=4)
+    for _ in range(CONTEXT.steps):
+        seen, *_, infos = envs.step(np.zeros((N, 7)))
+    np.testing.assert_array_equal([one[-7:] for one in infos["final_obs"]], [context(4 + row) for row in range(N)])
+    assert (seen[:, -7:] != [context(4 + row) for row in range(N)]).any(axis=1).all()
+
+
 BRIEF = short("panda-random", steps=3)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import pickle
 import warnings
 
 import gymnasium as gym
@@ -11,10 +12,13 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import NormalizeObservation, RecordEpisodeStatistics, RecordVideo, TimeLimit
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import ikgym
-from baselines.episodes import begin
+from baselines.episodes import Simulation
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
 from ikgym.rl.task import steps_ahead
@@ -99,9 +103,9 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
     infos = [env.step(action)[-1] for action in actions]
     fractions = actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit)
     ahead = steps_ahead(task.ahead, scenario.dt)
-    arms, _ = begin(scenario, [11], preview=ahead, commands=task.commands)
+    simulation = Simulation(scenario, [11], preview=ahead, commands=task.commands)
     for info, action in zip(infos, fractions, strict=True):
-        out = arms.step(action[None])
+        out = simulation.step(action[None])
         assert info["tracking_cost"] == out.tracking_cost[0]
         assert info["velocity_cost"] == out.velocity_cost[0]
 
@@ -134,6 +138,43 @@ def test_an_episode_begins_at_its_first_step_also_after_a_lost_one(name):
 
 
 @every_id
+def test_pickled_in_mid_episode_it_goes_on_as_before(name):
+    env = gym.make(name)
+    env.reset(seed=2)
+    actions = actions_of(env, 6)
+    env.step(actions[0])
+    again = pickle.loads(pickle.dumps(env))
+    for action in actions[1:]:
+        assert identical(env.step(action)[:4], again.step(action)[:4])
+    assert identical(env.reset()[0], again.reset()[0])
+
+
+@every_id
+def test_wrappers_of_gymnasium(name):
+    env = NormalizeObservation(RecordEpisodeStatistics(TimeLimit(gym.make(name, lost_distance=None), 4)))
+    env.reset(seed=0)
+    steps = [env.step(action) for action in actions_of(env, 4)]
+    seen, _, terminated, truncated, info = steps[-1]
+    assert truncated
+    assert not terminated
+    assert info["episode"]["r"] == pytest.approx(sum(step[1] for step in steps))
+    assert seen.shape == env.unwrapped.observation_space.shape
+    assert np.abs(seen).max() < 10.0
+
+
+@one_id_at_least
+def test_an_episode_is_recorded(name, tmp_path):
+    pytest.importorskip("moviepy")
+    env = TimeLimit(gym.make(name, render_mode="rgb_array"), 4)
+    env = RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda _: True, disable_logger=True)
+    env.reset(seed=0)
+    for action in actions_of(env, 4):
+        env.step(action)
+    env.close()
+    assert len(list(tmp_path.glob("videos/*.mp4"))) == 1
+
+
+@every_id
 def test_torchrl_takes_it(name):
     check_env_specs = pytest.importorskip("torchrl.envs.utils").check_env_specs
     from torchrl.envs import GymEnv, GymWrapper
@@ -163,6 +204,16 @@ def test_fields_of_the_task_can_be_changed():
         with pytest.raises(IkgymError, match="Did you mean 'history'") as refused:
             make("ikgym/Track-v0", histroy=2)
         assert isinstance(refused.value, TypeError)  # as other libraries expect who try keywords
+
+
+@pytest.mark.slow
+def test_workers_of_stable_baselines3_find_it_by_its_module():
+    envs = make_vec_env("ikgym:ikgym/Track-v0", 1, seed=4, vec_env_cls=SubprocVecEnv, vec_env_kwargs=SPAWN)
+    try:
+        seen = envs.reset()
+        assert identical(seen, ikgym.rl.make_vec("learning-track", 1).reset(seed=4)[0])
+    finally:
+        envs.close()
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

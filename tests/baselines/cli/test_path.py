@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import json
 import re
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ from baselines.controller import StopReason
 from baselines.paths import retiming
 from baselines.paths.late import Loop
 from baselines.paths.starts import starts
+from tests.baselines.evaluation.test_export import interpolated
 from tests.robots import FOLDER, ROBOTS
 
 
@@ -246,11 +248,12 @@ def test_a_free_rotation_is_suggested_where_it_helps(capsys):
     assert "It can be driven as it is" in capsys.readouterr().out
 
 
-def test_tables_fit_the_terminal(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+@pytest.mark.parametrize("width", [80, 100])
+def test_tables_fit_the_terminal(width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
     assert main(command("ur10", "--acceleration", "20")) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert max(len(line) for line in lines if not line.startswith("start = ")) <= 80
+    assert max(len(line) for line in lines if not line.startswith("start = ")) <= width
 
 
 ROOM = '[[obstacles]]\nkind = "box"\nname = "block"\nposition = [0.55, 0, 0.25]\nsize = [0.2, 0.2, 0.2]\n'
@@ -289,6 +292,14 @@ def test_no_verdict_about_links_that_were_not_looked_at(capsys, tmp_path):
     arm_file("", "", "", "")
     assert main([*words, "--bodyless", "l1", "l2", "l3", "l4"]) == 2
     assert "expected an arm with bodies" in capsys.readouterr().err
+
+
+def test_an_arm_that_cannot_be_looked_at_is_said_not_to_be(capsys):
+    arm_file(BALL.format("sphere"), "", "", "")
+    assert main(["path", "weld.csv", "--arm", "mine.urdf", "--speed", "0.1", "--dt", "0.02"]) == 0
+    said = re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert "bodies, which do not count here: 1 on the arm" in said
+    assert "NOT LOOKED AT: 'l2': it has no shape; 'l3'" in said
 
 
 def test_without_obstacles_no_package_for_meshes_is_needed(capsys, monkeypatch):
@@ -342,7 +353,7 @@ def shares(scenario, jerk):
     ],
 )
 def test_a_stated_jerk_is_kept_by_the_retimed_path(name, jerk, capsys):
-    """At most 1.3 times as slow as without, at the Panda's limits."""
+    """Between samples, too, at 10 kHz; at most 1.3 times as slow as without, at the Panda's limits."""
     seconds, used, limit = [], [], np.array(jerk, dtype=float)
     for limits in ([], ["--jerk", *jerk]):
         assert main(["path", name, "--fastest", "--retime", "out.toml", *limits]) == 0
@@ -353,4 +364,13 @@ def test_a_stated_jerk_is_kept_by_the_retimed_path(name, jerk, capsys):
     np.testing.assert_array_equal(scenario.jerk_limit, np.broadcast_to(limit, 7))
     assert used[0][2] > 1.1
     assert max(used[1]) <= 1.0 + 1e-4
+    arm = scenario.arm
+    baselines.track(scenario, "qp").to_joint_trajectory("out.json")
+    points = json.loads(Path("out.json").read_text())["points"]
+    limits = arm.velocity_limit, arm.acceleration_limit, limit
+    for values, most in zip(interpolated(points, scenario.dt, accelerations=False), limits, strict=True):
+        assert (np.abs(values) <= (1.0 + 1e-4) * most).all()
+    q = np.array([point["positions"] for point in points])
+    assert (arm.lower <= q).all()
+    assert (q <= arm.upper).all()
     assert seconds[1] <= 1.3 * seconds[0]

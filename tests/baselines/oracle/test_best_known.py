@@ -1,3 +1,4 @@
+import concurrent.futures
 import dataclasses
 import itertools
 import json
@@ -157,3 +158,17 @@ DOUBTFUL = [r.scenario for r in read() if r.seed == 0 and r.cost > 1e-9 and r.sp
 def test_no_foresight_beats_a_record(name):
     better = [row.total_cost for row in evaluate(name, "rhc_foresight") if beaten_record(row)]
     assert not better, f"write them down with: {best_known.UPDATE}"
+
+
+def test_two_writers_lose_no_record(tmp_path):
+    """That the folder is locked against other processes is tested with :func:`baselines.files.locked`."""
+    path = tmp_path / "best.json"
+
+    def write(first):
+        for seed in range(first, first + 40):
+            record([Record("varga7-random", seed, 1.0, "a test", 0.0, {}, "0" * 12)], path)
+
+    with concurrent.futures.ThreadPoolExecutor() as pool:
+        list(pool.map(write, (0, 1000)))
+    assert [one.seed for one in read(path)] == [*range(40), *range(1000, 1040)]
+    assert [file.name for file in tmp_path.iterdir()] == ["best.json"]

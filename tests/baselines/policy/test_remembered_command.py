@@ -7,6 +7,7 @@ import pytest
 import baselines
 import ikgym
 from baselines.controller import Drives
+from baselines.episodes import rollouts
 from baselines.policy import Problem
 from baselines.policy_kernels import sent_rows
 from ikgym.kernels import threads
@@ -117,6 +118,15 @@ def test_the_remembered_command_is_that_of_an_ideal_plant(name):
         action = np.abs(rng.uniform(-1, 1, (rows, n))).astype(np.float32)
         sent_rows(model, q, action, last)
         assert identical(last, simulator.step(action).qdot)
+
+
+@pytest.mark.parametrize("name", ["qp", "sns"])
+def test_on_late_drives_the_limits_are_kept_from_the_command(name):
+    """With the observed velocity the error is some millimetres (rms), and grows."""
+    plant = ikgym.Plant(command_delay=2, bandwidth=62.9)
+    scenario = ikgym.scenarios.get("panda-random").replace(plant=plant, steps=700)
+    episodes = rollouts(scenario, baselines.make(name, scenario), ikgym.scenarios.seeds("validation", 4))
+    assert np.sqrt(np.mean([episode.position_error**2 for episode in episodes])) < 1e-4
 
 
 def test_a_controller_keeps_the_limits_from_its_last_command():

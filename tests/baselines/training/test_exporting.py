@@ -68,6 +68,15 @@ def test_large_actions_are_clipped_or_squashed_alike(name):
     assert compare(model, policy, rl.IDS[TRACK].arms(3, lost_distance=None), "learning-track", 10) > 50
 
 
+def test_an_agent_trained_at_100_hz_sees_as_far_ahead_at_500_hz(tmp_path):
+    envs = ikgym.sb3.make_vec(TRACK, 2)
+    model = model_of(PPO, envs, n_steps=8, batch_size=16)
+    export(model, envs, tmp_path / "a.safetensors")
+    policy = baselines.make("agent", "panda-random", path=str(tmp_path / "a.safetensors"))
+    assert policy.preview == (5, 25)
+    compare(model, policy, rl.make_vec("panda-random", 3, lost_distance=None), "panda-random", 20)
+
+
 def test_models_that_cannot_be_exported(tmp_path):
     file, small = tmp_path / "a.safetensors", {"n_steps": 8, "batch_size": 16, "device": "cpu"}
     for changes in ({"history": 2}, {"commands": 3}):

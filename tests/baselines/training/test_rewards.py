@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import errno
+import inspect
 import json
 import tempfile
 
@@ -19,8 +21,8 @@ from baselines.cli.commands.train import main
 from baselines.files import locked
 from baselines.training.options import Rewards
 from baselines.training.rewards import make, train
-from baselines.training.zoo import ALGORITHMS, read_settings
-from ikgym import rl
+from baselines.training.zoo import ALGORITHMS, OTHERS, arguments, read_settings
+from ikgym import files, rl
 from ikgym.exceptions import IkgymError
 from ikgym.sb3 import make_vec
 
@@ -86,6 +88,7 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
 
 
 @pytest.mark.parametrize("setting", [
+    {"learning_rate": "1e-3"},
     {"learning_rate": "lin_fast"},
     {"policy_kwargs": "dict(activation_fn=nn.Swish)"},
     {"policy_kwargs": "dict(activation_fn=eval('1'))"},
@@ -94,7 +97,7 @@ def test_time_ends_a_run_early_and_the_schedule_counts_steps(tmp_path):
     {"policy_kwargs": "dict(a=1).pop('a')"},
 ])  # fmt: skip
 def test_other_texts_are_refused(setting):
-    with pytest.raises(IkgymError, match=r"expected lin_ and a number|settings: expected|There is no activation"):
+    with pytest.raises(IkgymError, match=r"expected a number, or lin_|settings: expected|There is no activation"):
         model_of("ppo", {"n_steps": 8, "batch_size": 8, **setting})
 
 
@@ -206,11 +209,12 @@ def test_mistakes_are_named(words, message, settings, tmp_path, capsys):
     (f"{TRACK}: {{n_timesteps: 0}}", "n_timesteps: expected a finite number of at least 1"),
     (f"{TRACK}: {{n_timesteps: 64, gamma: 2020-01-01}}", "expected texts, finite numbers"),
     (f"{TRACK}: {{n_timesteps: 64, 1: 2}}", "expected texts, finite numbers"),
+    (f"{TRACK}: !!bool 3", "expected a YAML file"),
     ("[" * 50_000, "expected a YAML file"),
     (f"{TRACK}: {'x' * 10_000_000}", "expected at most 131072 bytes"),
-    ("a0: &a0 [x]\n" + "".join(f"a{n + 1}: &a{n + 1} [{', '.join([f'*a{n}'] * 10)}]\n" for n in range(30))
-     + f"{TRACK}: *a30", "at most 3 levels"),
-    (f"{TRACK}: &a {{n_timesteps: 64, policy_kwargs: *a}}", "at most 3 levels"),
+    ("a0: &a0 [x]\n" + "".join(f"a{n + 1}: &a{n + 1} [{', '.join([f'*a{n}'] * 10)}]\n" for n in range(30)),
+     "expected at most 10000 values"),
+    (f"{TRACK}: &a {{n_timesteps: 64, policy_kwargs: *a}}", "expected at most 10000 values"),
 ])  # fmt: skip
 def test_other_files_of_settings_are_refused(content, message, tmp_path):
     (tmp_path / "mine.yml").write_text(content, encoding="utf-8")
@@ -221,17 +225,41 @@ def test_other_files_of_settings_are_refused(content, message, tmp_path):
 @pytest.mark.parametrize(("algorithm", "setting", "message"), [
     ("ppo", {"gamma": -1}, "gamma: expected a finite number from 0 to 1, got -1.0."),
     ("ppo", {"clip_range": -1}, "clip_range: expected a finite number above 0, got -1.0."),
-    ("sac", {"tau": 0}, "tau: expected a finite number above 0 and of at most 1, got 0.0."),
-    ("sac", {"train_freq": [0, "step"]}, "train_freq: expected a finite number of at least 1, got 0.0."),
-    ("ppo", {"clip_range": "lin_-1"}, "clip_range: expected lin_ and a number above 0, got 'lin_-1'."),
+    ("ppo", {"clip_range": "lin_-1"}, "clip_range: expected a number, or lin_ and one above 0, got 'lin_-1'."),
+    ("ppo", {"clip_range": [1]}, r"clip_range: expected a finite number above 0, got \[1\]."),
+    ("ppo", {"n_epochs": "few"}, "n_epochs: expected a whole number of at least 1, got 'few'."),
+    ("ppo", {"n_steps": 1.5}, "n_steps: expected a whole number of at least 1, got 1.5."),
+    ("ppo", {"ent_coef": []}, "ent_coef: expected a finite number of at least 0"),
+    ("ppo", {"ent_coef": -0.1}, "ent_coef: expected a finite number of at least 0, got -0.1."),
+    ("ppo", {"ent_coef": "auto"}, "ent_coef: expected a finite number of at least 0, got 'auto'."),
+    ("ppo", {"target_kl": 0}, "target_kl: expected a finite number above 0, got 0.0."),
+    ("ppo", {"vf_coef": -1}, "vf_coef: expected a finite number of at least 0, got -1.0."),
+    ("ppo", {"max_grad_norm": 0}, "max_grad_norm: expected a finite number above 0, got 0.0."),
+    ("ppo", {"use_sde": "yes"}, "use_sde: expected true or false, got 'yes'."),
+    ("ppo", {"normalize_advantage": 1}, "normalize_advantage: expected true or false, got 1."),
+    ("ppo", {"sde_sample_freq": 4}, "sde_sample_freq has no effect without use_sde."),
     ("ppo", {"tensorboard_log": "logs"}, "no setting 'tensorboard_log' of ppo. Available: learning_rate, "),
+    ("ppo", {"device": "cuda"}, "no setting 'device' of ppo"),
     ("ppo", {"normalize": True}, "no setting 'normalize' of ppo. Did you mean 'normalize_advantage'"),
     ("ppo", {"noise_type": "normal", "noise_std": 0.1}, "no setting 'noise_type' of ppo"),
     ("ppo", {"policy": "MlpPolic"}, "no policy 'MlpPolic'. Did you mean 'MlpPolicy'"),
-    ("ppo", {"policy_kwargs": {"net_arc": [8]}}, "settings: ppo refuses .*'net_arc'"),
-    ("ppo", {"learning_rate": "1e-3"}, "settings: ppo refuses"),
-    ("ppo", {"n_steps": 1.5}, "settings: ppo refuses"),
-    ("sac", {"buffer_size": "1e5"}, "settings: sac refuses"),
+    ("ppo", {"policy_kwargs": [[[[1]]]]}, "policy_kwargs: expected a table, got"),
+    ("ppo", {"policy_kwargs": {"net_arc": [8]}}, "no key 'net_arc' of policy_kwargs. Did you mean 'net_arch'"),
+    ("ppo", {"policy_kwargs": {"net_arch": [8, 0]}}, "net_arch: expected a whole number of at least 1, got 0."),
+    ("ppo", {"policy_kwargs": {"net_arch": {"critic": [8]}}}, "no network 'critic' in net_arch. Available: pi, vf, qf"),
+    ("ppo", {"policy_kwargs": {"ortho_init": "no"}}, "ortho_init: expected true or false, got 'no'."),
+    ("ppo", {"policy_kwargs": {"activation_fn": "nn.ReLU"}}, "settings: ppo refuses"),
+    ("sac", {"ent_coef": "auto_-1"}, "ent_coef: expected a number, or auto_ and one above 0, got 'auto_-1'."),
+    ("sac", {"ent_coef": "low"}, "ent_coef: expected a finite number of at least 0, got 'low'."),
+    ("sac", {"target_entropy": "high"}, "target_entropy: expected a finite number, got 'high'."),
+    ("sac", {"tau": 0}, "tau: expected a finite number above 0 and of at most 1, got 0.0."),
+    ("sac", {"gradient_steps": 0}, "gradient_steps: expected -1 or a whole number of at least 1, got 0."),
+    ("sac", {"train_freq": [1, "day"]}, "no unit 'day' of train_freq. Available: step, episode"),
+    ("sac", {"train_freq": 0}, "train_freq: expected a whole number of at least 1, got 0."),
+    ("sac", {"learning_starts": -1}, "learning_starts: expected a whole number of at least 0, got -1."),
+    ("sac", {"buffer_size": "1e5"}, "buffer_size: expected a whole number of at least 1, got '1e5'."),
+    ("sac", {"replay_buffer_kwargs": 3}, "replay_buffer_kwargs: expected a table, got 3."),
+    ("td3", {"target_policy_noise": -0.1}, "target_policy_noise: expected a finite number of at least 0, got -0.1."),
     ("td3", {"noise_type": "ornstein-uhlenbeck"}, "no noise_type 'ornstein-uhlenbeck'. Available: normal"),
     ("td3", {"noise_std": 0.1}, "There is no noise_type None. Available: normal"),
     ("td3", {"noise_type": "normal", "noise_std": -1}, "noise_std: expected a finite number of at least 0, got -1.0."),
@@ -239,6 +267,20 @@ def test_other_files_of_settings_are_refused(content, message, tmp_path):
 def test_settings_that_mean_nothing_are_refused_before_the_training(algorithm, setting, message):
     with pytest.raises(IkgymError, match=message):
         model_of(algorithm, setting)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_the_defaults_of_an_algorithm_are_settings(algorithm):
+    """So that each of its parameters passes its check, and none is forgotten."""
+    kind = ALGORITHMS[algorithm]
+    defaults = {name: one.default for name, one in inspect.signature(kind).parameters.items() if name not in OTHERS}
+    of_noise = {"sde_sample_freq", "use_sde_at_warmup"}
+    expected = {name: value for name, value in defaults.items() if name not in of_noise}
+    assert len(expected) > 10
+    assert arguments(algorithm, expected, 7).items() >= expected.items()
+    sde = {name: value for name, value in defaults.items() if name in of_noise}
+    if sde:
+        assert arguments(algorithm, {**sde, "use_sde": True}, 7).items() >= sde.items()
 
 
 @pytest.mark.parametrize("settings", ["ppo"], indirect=True)
@@ -250,6 +292,25 @@ def test_errors_of_the_library_are_one_line(settings, tmp_path, capsys):
     error = capsys.readouterr().err
     assert "settings: ppo refuses" in error
     assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize("settings", ["ppo"], indirect=True)
+def test_a_full_disk_ends_a_run_with_a_message_and_the_command_begins_it_again(settings, tmp_path, capsys, monkeypatch):
+    write = files.write
+
+    def write_if_there_is_space(file, content):
+        if file.name == "model.zip":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(file, content)
+
+    words = ["ppo", "--env", TRACK, "--settings", str(settings), "--episodes", "2", "--out", str(tmp_path)]
+    with monkeypatch.context() as patched:
+        patched.setattr(files, "write", write_if_there_is_space)
+        assert main(words) == 2
+    file = tmp_path / "seed-0" / "model.zip"
+    assert capsys.readouterr().err == f"error: Cannot write {file}: No space left on device.\n"
+    assert not (tmp_path / "seed-0" / "run.json").exists()
+    assert main(words) == 0
 
 
 @pytest.mark.parametrize("settings", ["ppo"], indirect=True)

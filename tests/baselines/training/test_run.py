@@ -145,6 +145,22 @@ def test_finished_runs_are_left_as_they_are(finished):
     }
 
 
+def test_a_run_killed_between_its_last_checkpoint_and_its_description_is_complete(finished, tmp_path, monkeypatch):
+    write_json = run_module.write_json
+
+    def killed(file, content):
+        if len(content["history"]) > CONFIG.segments:
+            raise KeyboardInterrupt
+        write_json(file, content)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run_module, "write_json", killed)
+        with pytest.raises(KeyboardInterrupt):
+            train(CONFIG, 3, tmp_path)
+    assert train(CONFIG, 3, tmp_path)["weights_sha256"] == finished[1]["weights_sha256"]
+    assert timeless(tmp_path) == timeless(finished[0])
+
+
 @pytest.mark.parametrize("part", ["checkpoint.pt", "run.json", "events.out.tfevents.apg", "agent.safetensors"])
 def test_a_full_disk_ends_a_run_with_a_message_and_it_is_resumed(part, finished, tmp_path, monkeypatch):
     """From the second segment on."""
@@ -161,6 +177,18 @@ def test_a_full_disk_ends_a_run_with_a_message_and_it_is_resumed(part, finished,
             train(CONFIG, 3, tmp_path, on_segment=lambda done, cost: segments.append(done))
     train(CONFIG, 3, tmp_path)
     assert_same_run(finished[0], tmp_path)
+
+
+def test_links_are_replaced_and_not_followed(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    theirs = tmp_path / "elsewhere" / "events.out.tfevents.1"
+    theirs.write_text("of somebody else")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "tensorboard").symlink_to(tmp_path / "elsewhere")
+    for file in ("checkpoint.pt", "events.out.tfevents.apg", "agent.safetensors"):
+        (tmp_path / "run" / file).symlink_to(theirs)
+    train(CONFIG.replace(segments=1), 3, tmp_path / "run")
+    assert [file.read_text() for file in (tmp_path / "elsewhere").iterdir()] == ["of somebody else"]
 
 
 def test_seeds_differ_and_validation_changes_nothing(finished, tmp_path):
@@ -211,6 +239,15 @@ def test_damaged_files(finished, tmp_path, name, content, message):
     else:
         save_checkpoint(tmp_path / name, content)
     with pytest.raises(ResultsError, match=message):
+        train(CONFIG, 3, tmp_path)
+
+
+def test_a_checkpoint_with_one_other_byte_is_damaged(finished, tmp_path):
+    copied(finished[0], tmp_path)
+    content = bytearray((tmp_path / "checkpoint.pt").read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / "checkpoint.pt").write_bytes(content)
+    with pytest.raises(ResultsError, match="its SHA-256 is another"):
         train(CONFIG, 3, tmp_path)
 
 
