@@ -18,7 +18,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import ikgym
-from baselines.episodes import Simulation
+from baselines.episodes import begin
 from ikgym.exceptions import IkgymError
 from ikgym.rl import IDS
 from ikgym.rl.task import steps_ahead
@@ -103,9 +103,9 @@ def test_costs_below_are_those_of_the_benchmark_bit_for_bit(name):
     infos = [env.step(action)[-1] for action in actions]
     fractions = actions.astype(np.float64) * (task.share * scenario.largest_qdot / scenario.velocity_limit)
     ahead = steps_ahead(task.ahead, scenario.dt)
-    simulation = Simulation(scenario, [11], preview=ahead, commands=task.commands)
+    arms, _ = begin(scenario, [11], preview=ahead, commands=task.commands)
     for info, action in zip(infos, fractions, strict=True):
-        out = simulation.step(action[None])
+        out = arms.step(action[None])
         assert info["tracking_cost"] == out.tracking_cost[0]
         assert info["velocity_cost"] == out.velocity_cost[0]
 
