@@ -31,8 +31,7 @@ $(STAMP): $(CORE)
 
 demo: $(CORE) ## Play eight solvers on a Panda and on the paper's trajectory: tables, and results/demo/report.html
 	$(BIN)/ikgym evaluate --scenarios panda-turn varga7-fast --policies $(DEMO) $(RIVALS) --workers 2 --out results/demo --overwrite
-	@echo 'Look at the columns cost ratio (1: best known) and followed: of the eight only rhc_foresight follows panda-turn;'
-	@echo 'on varga7-fast mfac does, at four times the best known cost.'
+	@echo 'Look at the columns cost ratio (1: best known) and followed; README.md says why solvers differ.'
 
 test: $(STAMP) ## Run the tests that are not marked slow
 	$(PYTEST) -m "not slow"

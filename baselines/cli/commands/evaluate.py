@@ -43,12 +43,17 @@ RULES = (
         "without --out",
     ),
     Rule(
+        ("--episodes", "--split", "--steps", "--noise-seeds", "--severities"),
+        lambda given: not given.test_sets,
+        "with --test-sets, which define the episodes",
+    ),
+    Rule(
         ("--episodes", "--split"),
         _any(lambda one: one.varies),
         "on scenarios that are the same at every reset",
     ),
     Rule(("--noise-seeds",), _any(lambda one: one.plant.noisy), "on plants without noise"),
-    Rule(("--pairs",), _any(lambda one: not one.plant.ideal), "on ideal plants"),
+    Rule(("--pairs", "--severities"), _any(lambda one: not one.plant.ideal), "on ideal plants"),
     Rule(("--accelerations",), lambda given: bool(given.export), "without --export"),
     ONE_KIND,
     Rule(("--cluster",), lambda given: given.timed != "all", "with --timed all, since timed episodes are played here"),
