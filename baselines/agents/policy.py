@@ -192,7 +192,7 @@ class AgentAlone(LearnedPolicy):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AgentTrack(AgentAlone):
-    """Learned agent that comes with the package, trained in `ikgym/Track-v0` by SAC.
+    """Learned agent that comes with the package, trained in `ikgym/Track-v0` by TD3.
 
     Args:
         problem: The part of the scenario that the policy knows.
@@ -203,7 +203,7 @@ class AgentTrack(AgentAlone):
         InvalidInputError: The file has another hash, or the scenario does not fit the agent.
     """
 
-    hash: str = "b171f315d892"
+    hash: str = "39fe95f6b3c5"
 
     name: ClassVar[str] = "agent_track"
 
