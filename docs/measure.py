@@ -72,10 +72,11 @@ def _group(name: str, old: list[Line], only_new: bool) -> list[Line]:
         episodes, noise_seeds = conditions
         folder = f"{name}-{old[0]['scenario']}-{episodes}-{noise_seeds}"
         rows = evaluate(scenario, played, episodes=episodes, noise_seeds=noise_seeds, **resumable(folder))
-        ranked = {one["policy"]: one for one in records(rank(rows, list(some)))}
-        for spec, line in some.items():  # a policy that could not be played is an error here
-            errors = _errors(line, rows) if "error_mm" in line else {}
-            out.append(line | ranked[spec] | {"policy": line["policy"]} | errors)
+        if rows.skipped:  # its line would be lost, or lack a seed
+            raise SystemExit("\n".join(f"{one.policy} in {one.scenario}: {one.reason}" for one in rows.skipped))
+        for one in records(rank(rows, list(some))):
+            line = some[one["policy"]]
+            out.append(line | one | {"policy": line["policy"]} | (_errors(line, rows) if "error_mm" in line else {}))
     if "front" in old[0]:
         best = front(out)
         out = [{**line, "front": "yes" if line in best else "no"} for line in out]

@@ -80,6 +80,12 @@ def test_a_label_stands_for_a_policy(table):
     assert old["cost_ratio"] == "1.5"
 
 
+def test_no_line_is_lost_with_a_policy_that_cannot_be_played(table):
+    table("some", HEAD + "dls,varga7-fast,1,1,,,\nagent_track,varga7-fast,1,1,,,\n")
+    with pytest.raises(SystemExit, match="agent_track in varga7-fast: "):
+        measure.measure_lines("some", only_new=True)
+
+
 def test_the_lines_of_plants_can_be_played():
     for line in keeping.lines("plants"):
         name, parameters = parsed(line["spec"])
