@@ -50,8 +50,8 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
     "qp": ("qp", {"gain": 0.3}),
     "dls": ("dls", {"gain": 0.15}),
 }
-#: Learners by their names: published settings, and what is observed.
-USUAL = Task(SPLITS["train"][0], commands=4, share=0.5)
+#: Learners by their names: published settings, what is observed, and the reward of `ikgym/Limits-v0`.
+USUAL = Task(SPLITS["train"][0], commands=4, share=0.5, half=0.05, steepness=1.0, progress=30.0)
 LEARNERS = {
     "ppo_shown": (Rewards(env="ikgym/Track-v0"), USUAL.replace(context=True)),
     "ppo_history": (Rewards(env="ikgym/Track-v0"), USUAL.replace(history=4)),
