@@ -23,7 +23,7 @@ from baselines.files import write_json
 from baselines.statistics import geometric_interval, geometric_mean
 from baselines.training.options import Rewards
 from docs.keeping import RUNS, Line, lines, resumable
-from ikgym.rl import Task, scoring
+from ikgym.rl import IDS, Task, scoring
 from ikgym.validation import BoolArray, FloatArray
 
 #: Scenario and seeds of each split, and its episodes.
@@ -51,7 +51,7 @@ POLICIES: dict[str, tuple[str, dict[str, Any]]] = {
     "dls": ("dls", {"gain": 0.15}),
 }
 #: Learners by their names: published settings, what is observed, and the reward of `ikgym/Limits-v0`.
-USUAL = Task(SPLITS["train"][0], commands=4, share=0.5, half=0.05, steepness=1.0, progress=30.0)
+USUAL = IDS["ikgym/Limits-v0"].task.replace(scenario=SPLITS["train"][0], commands=4, share=0.5)
 LEARNERS = {
     "ppo_shown": (Rewards(env="ikgym/Track-v0"), USUAL.replace(context=True)),
     "ppo_history": (Rewards(env="ikgym/Track-v0"), USUAL.replace(history=4)),
